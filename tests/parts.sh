@@ -2,10 +2,10 @@
 # The parts of `./dev test`, which sources this file and has the lists of packages.
 # shellcheck disable=SC2154
 
-# part NAME COMMAND...: a part of the tests, and how long it takes.
-# One that fails does not keep the others from running: end_of_parts fails for it. One that passed is
-# noted in build/passed with what the tree was, so that --resume need not repeat it. One that cannot be
-# had on this machine ends with $skipped.
+# part NAME COMMAND...: runs a part of the tests and prints its time.
+# The others run after a failed part, and end_of_parts fails for it. A part that passed is
+# recorded in build/passed with a digest of the tree, so that --resume need not repeat it. A part that cannot
+# run on this machine ends with $skipped.
 skipped=77
 failed_parts=()
 skipped_parts=()
@@ -18,7 +18,7 @@ part() {
     echo "dev: $name passed on this very tree before"
     return
   fi
-  # In `( … ) || …` the shell would go on after a command that fails inside.
+  # In `( … ) || …` the shell would continue after a command that fails inside.
   set +e
   (set -e; "$@")
   status=$?
@@ -37,8 +37,8 @@ part() {
   echo "dev: $name took $((SECONDS - began)) s$verdict"
 }
 
-# Of every file of the tree as git sees it, uncommitted changes included, but for the page that says
-# afterwards what the tests measured.
+# A digest of every file of the tree as git sees it, including uncommitted changes, but without the page of
+# the tests' measurements.
 tree_digest() {
   git ls-files -z --cached --others --exclude-standard -- . ':!tests/MEASURED.md' | { xargs -0 sha256sum 2>&1 || true; } | sha256sum
 }
@@ -52,7 +52,7 @@ end_of_parts() {
 
 test_dev() {
   build_preset dev
-  # A guest waits for much of its time: one test more than there are processors. Daemons have to keep pace with
+  # A guest waits for much of its time: one test more than processors. Daemons have to keep pace with
   # the camera, so nothing that computes for minutes runs beside them.
   ctest --test-dir build/dev --output-on-failure -LE e2e -j"$(($(nproc) + 1))"
   ctest --test-dir build/dev --output-on-failure -L e2e -j"$(nproc)"
@@ -70,15 +70,15 @@ check_format() {
     tests/install/guest/{dtact-test,initrd-init}
 }
 
-# test_sanitized PRESET LABELS TESTS: all tests but those with such labels or names.
+# test_sanitized PRESET LABELS TESTS: all tests except those with these labels or names.
 test_sanitized() {
   build_preset "$1" hal/all daemon/all clients/all tests/{unit,fuzz,e2e,soak}/all bench_tests
-  # End to end a test has the machine for itself; the unit tests' deadlines stand company.
+  # An end-to-end test has the machine for itself; the unit tests' deadlines tolerate others.
   ctest --test-dir "build/$1" --output-on-failure -L unit -E "$3" -j"$(nproc)"
   ctest --test-dir "build/$1" --output-on-failure -LE "unit|$2" -E "$3"
 }
 
-# As users get them, and the same bytes from another place.
+# Packages as users get them, and the same bytes from another place.
 test_compiled_packages() {
   tests/packages/build.sh build/packages
   /usr/bin/python3 -B tests/packages/contents_test.py build/packages
@@ -122,20 +122,20 @@ run_tests() {
   # The guest kernel has no memory for the sanitizers' shadows. The accuracy tests run the code of the
   # unit tests on more images and take longer than all others together.
   part 'the address and undefined-behaviour sanitizers' test_sanitized asan-ubsan 'kernel|accuracy|web' '^python_test$'
-  # Those named have one thread; a live session is too slow. Where threads are watched protobuf's maps
-  # look otherwise than Debian's library has them: what reads Foxglove's JSON cannot run.
+  # The excluded ones have one thread; a live session is too slow. Under the thread sanitizer protobuf's maps
+  # have another layout than in Debian's library, so code that reads Foxglove's JSON cannot run.
   part 'the thread sanitizer' test_sanitized tsan 'kernel|accuracy|live' \
     '^((recon|calibration|offline|lens_calibration|sim_parts|luma|mjpeg|wire|python|web)_test|e2e_foxglove|fuzz_web)$'
   part 'the packages, built twice' test_compiled_packages
   part 'Debian 13' test_platform debian13
   part arm64 test_platform arm64
   part "Debian 13's packages for arm64" run_package --debian 13 --arch arm64
-  # Of what the part with the packages has built: what users install, and not the dev build's.
+  # From the packages of the part above: users install these, not the dev build's.
   part 'installation, faults and power cuts' test_installed --all --cuts 20 --packages build/packages
-  # Of what the part "Debian 13" has built.
+  # From the packages of the part "Debian 13".
   part 'installation on Debian 13' test_installed --suite trixie --all \
     --packages "build/dev/packages-debian13-$(dpkg --print-architecture)"
-  # Of what the parts for arm64 have built.
+  # From the packages of the parts for arm64.
   part 'installation on arm64' test_installed --architecture arm64 --all
   part 'installation on Debian 13 for arm64' test_installed --architecture arm64 --suite trixie --all \
     --packages build/packages-debian13-arm64

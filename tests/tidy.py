@@ -41,7 +41,7 @@ def digest_of(path):
 
 
 def headers(build):
-    """Object file -> what ninja knows that it was compiled from."""
+    """Object file -> its sources, from ninja's dependencies."""
     reported = subprocess.run(["ninja", "-C", build, "-t", "deps"], check=True, capture_output=True, text=True)
     read, current = {}, None
     for line in reported.stdout.splitlines():
@@ -53,7 +53,7 @@ def headers(build):
 
 
 def apart(entry):
-    """An entry for each file that CMake put together into one (CMAKE_UNITY_BUILD), or itself."""
+    """An entry for each file in one of CMake's unity sources (CMAKE_UNITY_BUILD), or the entry itself."""
     if not re.search(r"/Unity/unity_\d+_cxx\.cxx$", entry["file"]):
         return [entry]
     text = pathlib.Path(entry["file"]).read_text()
@@ -69,13 +69,13 @@ def key(entry, read, common):
 
 
 def flags(entry):
-    """The command line without what to compile into what."""
+    """The command line without input and output."""
     words = shlex.split(entry["command"])[1:]
     return words[: words.index("-o")]
 
 
 def groups(entries):
-    """Of one folder and compiled alike, at most TOGETHER each."""
+    """Groups of at most TOGETHER files of one folder with the same options."""
     alike = collections.defaultdict(list)
     for entry in entries:
         alike[os.path.dirname(entry["file"]), *flags(entry)].append(entry)
@@ -88,7 +88,7 @@ def run(arguments):
 
 def run_together(entries):
     first = entries[0]
-    # The rules are those of the files' folder, not of where the file that includes them lies.
+    # The rules are those of the files' folder, not of the folder of the file that includes them.
     rules = subprocess.run(
         [TOOL, "--dump-config", first["file"], "--"], check=True, capture_output=True, text=True
     ).stdout
@@ -127,7 +127,7 @@ def main():
     def check(entries):
         if len(entries) > 1:
             reported = run_together(entries)
-            # What does not compile together, or only with warnings, says nothing of the files.
+            # Files that do not compile together, or only with warnings, are checked one by one.
             if reported.returncode == 0 or "[clang-diagnostic-" not in reported.stdout:
                 return verdict(entries, reported)
         verdicts = collections.Counter()

@@ -22,7 +22,7 @@ evaluate sensor_a
 evaluate sensor_b
 evaluate sensor_c
 
-# raw SENSOR MM_PER_PX: the same ball on the frame as it is, without a lens.
+# raw SENSOR MM_PER_PX: the same ball on the unrectified frame, without a lens.
 raw() {
   local images=../shared/data/$1
   [[ -d $images ]] || return 0

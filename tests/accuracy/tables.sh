@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Makes the tables, plots and pages that lie beside this file from the simulated sensor:
+# Makes the tables, plots and pages beside this file from the simulated sensor:
 # tables.sh BIN [table|objects|model|atlas|thickness|study|whole ...], all of them without a name. BIN: where the accuracy
 # tests were built.
 set -euo pipefail

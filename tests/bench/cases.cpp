@@ -27,11 +27,11 @@ namespace {
 
 using Depth = std::vector<std::int16_t>;
 
-/// Radius of the standard press with its bulge: the least of the round ones that makes all tiles
+/// Radius of the standard press with its bulge: the smallest round press that makes all tiles
 /// active.
 constexpr double kPressRadius = 380;
 
-/// What every case reads.
+/// The inputs of all cases.
 struct Inputs {
   LensMap lens = make_lens_map();
   std::shared_ptr<const recon::Model> model = std::make_shared<recon::Model>(make_model());
@@ -59,7 +59,7 @@ std::string compare(const Depth& is, const Depth& should) {
   return {};
 }
 
-/// The other pipelines see no bulge and cut their bits earlier: they are compared where the press
+/// The other pipelines have no bulge and cut their bits earlier: they are compared where the press
 /// is deeper than 0.3 mm, and must agree within 0.02 mm on average.
 std::string compare_roughly(const float* mm, const Depth& um) {
   double sum = 0;
@@ -80,8 +80,8 @@ struct Told {
   double uncertainty_um = 0;
 };
 
-/// What the daemon does for a frame whose depth somebody wants: look for what changed, reconstruct
-/// that, see contact, state the uncertainty.
+/// The daemon's work on a frame with a depth subscriber: find active tiles, reconstruct them, find
+/// contact, state the uncertainty.
 class DaemonFrame {
  public:
   explicit DaemonFrame(std::shared_ptr<const recon::Model> model)
@@ -105,7 +105,7 @@ class DaemonFrame {
     look(luma, stride);
     reconstructor_.run_active(luma, stride, tiles_, depth_, drawn_);
   }
-  /// Empty, or what is wrong with the last run() on that frame.
+  /// Empty, or the error of the last run() on that frame.
   [[nodiscard]] std::string wrong(const std::uint8_t* luma, std::ptrdiff_t stride) const {
     recon::Specification specification(*model_);
     Depth should = specification.run(luma, stride);
@@ -157,7 +157,7 @@ class DaemonFrame {
     const auto row = static_cast<std::size_t>(y / recon::TileGrid::kRows);
     return (drawn_.tiles[row] >> (x / grid().tile_width()) & 1U) != 0;
   }
-  /// The finished map, a pixel at a time.
+  /// Sums over the finished map, a pixel at a time.
   void add_up(recon::DepthSums& sums) const {
     const int reach = sums.rules.bend_reach;
     for (int y = 0; y < grid().height; ++y) {
@@ -185,7 +185,7 @@ class DaemonFrame {
   Told reported_;
 };
 
-/// Share of the map's pixels that lie in the tiles: the tiles at its right edge are narrower.
+/// Share of the map's pixels in the tiles: the tiles at its right edge are narrower.
 double share_of(const recon::TileRows& tiles, const recon::TileGrid& grid) {
   int pixels = 0;
   for (int row = 0; row < grid.rows(); ++row) {
@@ -198,7 +198,7 @@ double share_of(const recon::TileRows& tiles, const recon::TileGrid& grid) {
   return static_cast<double>(pixels) / (grid.width * grid.height);
 }
 
-/// One frame over and over. `everywhere`: all of its tiles must be active.
+/// One frame repeatedly. `everywhere`: all of its tiles must be active.
 Case daemon_frame(const std::string& name, std::shared_ptr<const recon::Model> model, Image frame,
                   bool everywhere) {
   struct State {
@@ -219,7 +219,7 @@ Case daemon_frame(const std::string& name, std::shared_ptr<const recon::Model> m
 
 Case full_field(const Inputs& in) { return daemon_frame("full", in.model, in.press, true); }
 
-/// The full field without contact and uncertainty.
+/// The whole map without contact and uncertainty.
 Case bare(const Inputs& in) {
   auto daemon = std::make_shared<DaemonFrame>(in.model);
   return {"full-bare", [&in, daemon] { daemon->run_bare(in.press.data(), kFrameWidth); },
@@ -255,7 +255,7 @@ Case opencv(const Inputs& in) {
           [&in, state] { return compare_roughly(state->depth.ptr<float>(), in.specified); }};
 }
 
-/// From the payload to what the daemon tells, or the decoding alone.
+/// From the payload to the daemon's results, or the decoding only.
 Case mjpeg(const Inputs& in, const std::string& name, bool reconstruct) {
   struct State {
     hal::mjpeg::GreyDecoder decoder{kFrameWidth, kFrameHeight};
@@ -284,7 +284,7 @@ Case mjpeg(const Inputs& in, const std::string& name, bool reconstruct) {
 
 using Maker = std::function<Case(const std::string& name, const Inputs&)>;
 
-/// All cases, each made when it is asked for: those who count instructions start a process for one.
+/// All cases, each made on request: counting instructions starts a process for a single case.
 const std::vector<std::pair<std::string, Maker>>& makers() {
   static const auto the_makers = [] {
     std::vector<std::pair<std::string, Maker>> all{
@@ -297,7 +297,7 @@ const std::vector<std::pair<std::string, Maker>>& makers() {
         {"decode", [](const auto& name, const Inputs& in) { return mjpeg(in, name, false); }},
         {"decode+full", [](const auto& name, const Inputs& in) { return mjpeg(in, name, true); }}};
     for (const int radius : {0, 40, 80, 120, 160, 190, 220, 260, 300, 340, 380, 450}) {
-      // Only what changed is computed.
+      // Only active tiles are computed.
       all.emplace_back(
           fmt::format("press:{}", radius), [radius](const std::string& name, const Inputs& in) {
             return daemon_frame(name, in.model, Inputs::with_padding(make_frame(radius, 2)), false);

@@ -13,10 +13,10 @@ namespace dtact::bench {
   return now.tv_sec * std::int64_t{1'000'000'000} + now.tv_nsec;
 }
 
-/// The same, microseconds.
+/// The same in microseconds.
 [[nodiscard]] inline double thread_us() { return static_cast<double>(thread_ns()) * 1e-3; }
 
-/// What `work` takes of it, milliseconds.
+/// This time of `work`, milliseconds.
 template <typename Work>
 [[nodiscard]] double cpu_ms(Work work) {
   const std::int64_t began = thread_ns();

@@ -18,7 +18,7 @@ def line(goal, measured, met, shortfall):
 
 
 def report(folder, part, goals):
-    """Prints (goal, measured, met, by how much it is short) and keeps them for the summary."""
+    """Prints (goal, measured, met, missing amount) and keeps them for the summary."""
     with open(path(folder, part), "w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow(["goal", "measured", "met", "shortfall"])

@@ -1,7 +1,7 @@
-// bench_memory: what reading one 800x600 picture costs from each kind of memory that this machine
-// has for it: its own, that of the DMA heaps, and that which the driver of a bare sensor gives (a
+// bench_memory: time to read one 800x600 picture from each kind of memory on this machine: its
+// own, that of the DMA heaps, and that of a bare sensor's driver (a
 // Raspberry Pi's CSI camera, without caches). The median of many readings in microseconds: byte by
-// byte, and as hal/luma reads full and limited range.
+// byte, and with hal/luma for full and limited range.
 #include <fmt/format.h>
 #include <libcamera/camera_manager.h>
 #include <libcamera/framebuffer_allocator.h>
@@ -43,8 +43,8 @@ double median_us(const std::function<void()>& read) {
   return static_cast<double>(times[times.size() / 2]) / 1000;
 }
 
-/// Each reading begins with telling the caches of it, as for a frame (`fd` < 0: no DMA buffer),
-/// which empties those of cached memory.
+/// Each reading begins with the cache synchronisation of a frame (`fd` < 0: no DMA buffer),
+/// which empties the caches of cached memory.
 void measure(const std::string& name, int fd, std::span<const std::uint8_t> bytes) {
   luma::LumaBuffer out(kWidth, kHeight);
   const auto bracketed = [&](const std::function<void()>& read) {

@@ -8,8 +8,8 @@
 
 namespace dtact::bench {
 
-/// The paper's pipeline in C++ with OpenCV, as a careful user of it would write it: grey
-/// throughout, fixed-point remap of the crop alone, subtract, list by LUT, two 7×7 Gaussian
+/// The paper's pipeline in C++ with OpenCV, as a careful user would write it: grey
+/// throughout, fixed-point remap of the crop only, subtract, LUT, two 7×7 Gaussian
 /// filters.
 class OpenCvPipeline {
  public:

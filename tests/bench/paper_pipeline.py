@@ -21,16 +21,16 @@ import cv2
 import numpy as np
 
 WIDTH, HEIGHT, SIDE = 800, 600, 580
-# Where the crop lies in the rectified frame.
+# Position of the crop in the rectified frame.
 TOP, LEFT = (HEIGHT - SIDE) // 2, (WIDTH - SIDE) // 2
 
 
 class PaperPipeline:
-    """`map_x`, `map_y`: where in the frame each pixel of the crop lies, SIDE x SIDE float32;
+    """`map_x`, `map_y`: position in the frame of each pixel of the crop, SIDE x SIDE float32;
     `reference_image`: the reference image, HEIGHT x WIDTH x 3 bytes."""
 
     def __init__(self, map_x, map_y, reference_image):
-        # The published way rectifies the whole frame before it is cropped; outside the crop the
+        # The published method rectifies the whole frame before it is cropped; outside the crop the
         # map's content does not matter.
         self.maps = [np.ascontiguousarray(np.pad(m, ((TOP, TOP), (LEFT, LEFT)), mode="edge"))
                      for m in (map_x, map_y)]
@@ -48,7 +48,7 @@ class PaperPipeline:
 
 
 class Cases(PaperPipeline):
-    """What ./dev bench times, on the inputs in `folder`."""
+    """The part that ./dev bench times, on the inputs in `folder`."""
 
     def __init__(self, folder):
         def read(name, kind):
@@ -75,7 +75,7 @@ class Cases(PaperPipeline):
 
 
 def wrong(depth_mm, expected_um):
-    """The signed pipeline sees a bulge and keeps more bits: compared where the press is deeper than
+    """The signed pipeline has a bulge and keeps more bits: compared where the press is deeper than
     0.3 mm."""
     pressed = expected_um >= 300
     apart = float(np.abs(depth_mm - expected_um / 1000.0)[pressed].mean())

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Measures what the daemon does for a frame (look for what changed, reconstruct, contact,
+"""Measures the daemon's work on a frame (find active tiles, reconstruct, contact,
 uncertainty) beside OpenCV in C++ and the paper's pipeline in Python, which make the depth alone.
 
 Two servers (bench_server, paper_pipeline.py) run on one core and time one case at a time; this
@@ -33,7 +33,7 @@ LABEL = {
     "full-bare": "the same, no contact, no uncertainty",
     "decode+full": "MJPEG frame to depth",
     "decode": "MJPEG decode alone",
-    "press:0": "nothing touching",
+    "press:0": "no contact",
     "half": "half resolution, 290x290",
     "quarter": "quarter resolution, 145x145",
     "scalar": "scalar kernels (specification)",
@@ -121,7 +121,7 @@ def count_instructions(server, case, quick):
 
 
 def build():
-    """The server in a release build of its own."""
+    """The server in its own release build."""
     top = os.path.dirname(os.path.dirname(HERE))
     folder = os.path.join(top, "build", "bench", "cmake")
     for step in (["cmake", "-S", top, "-B", folder, "-G", "Ninja", "-DCMAKE_BUILD_TYPE=Release",
@@ -135,7 +135,7 @@ def build():
 
 
 def measure(servers, cases, seconds, samples):
-    """Rounds over all cases until the time is up, one at least; samples[case] is a list of rounds'
+    """Rounds over all cases until the time is up, at least one; samples[case] is a list of rounds'
     lists."""
     end = time.monotonic() + seconds
     order = list(cases)
@@ -274,7 +274,7 @@ def main():
         cases.update({name: "paper" for name in paper.ask("list").split()})
         target = ours.ask("target")
 
-        # What a slow machine takes to begin is taken off the time to measure.
+        # The start of a slow machine is subtracted from the time to measure.
         before = time.monotonic()
         measure(servers, cases, 0, {case: [] for case in cases})
         wrong = verify(servers, cases)

@@ -1,6 +1,6 @@
 #include "tests/bench/scene.hpp"
 
-// clang-format off: jpeglib.h uses FILE and size_t and leaves it to others to declare them.
+// clang-format off: jpeglib.h uses FILE and size_t without declaring them.
 #include <cstdio>
 #include <jpeglib.h>
 // clang-format on
@@ -22,7 +22,7 @@ double light(double x, double y) {
   return 165 - 45 * r * r;
 }
 
-/// Change of a press against the radius, 1 = where the bulge is gone: sensor_a's ball has half its
+/// Change of a press against the radius, 1 = end of the bulge: sensor_a's ball has half its
 /// darkening at 0.32, none at 0.43 and its brightest ring at 0.56 of that radius.
 double darkening(double r) {
   if (r >= 1) return 0;
@@ -38,8 +38,8 @@ std::uint8_t grey(double value) {
 }  // namespace
 
 LensMap make_lens_map() {
-  // A barrel of a wide lens: a pixel at the map's corner (radius 410) is read at 0.84 of its
-  // radius.
+  // A wide lens's barrel distortion: a pixel at the map's corner (radius 410) is read at 0.84 of
+  // its radius.
   LensMap map;
   for (int v = 0; v < kMapSide; ++v) {
     for (int u = 0; u < kMapSide; ++u) {

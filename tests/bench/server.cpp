@@ -1,8 +1,8 @@
 // Times one case at a time on request, so that a driver can alternate between cases and processes.
 //   list               NAME=SHARE of the map that is computed, one line
-//   verify NAME        "ok" or what is wrong
+//   verify NAME        "ok" or the error
 //   run NAME COUNT     two unmeasured runs, then COUNT times, nanoseconds of CPU, one line
-//   once NAME COUNT    COUNT runs and no more, for counting instructions
+//   once NAME COUNT    exactly COUNT runs, for counting instructions
 //   target             the instruction set the kernels run with
 //   export FOLDER      the inputs, for the Python pipeline
 #include <algorithm>
@@ -23,7 +23,7 @@ namespace {
 using dtact::bench::Case;
 using dtact::bench::thread_ns;
 
-/// Made when first asked for.
+/// Made at the first request.
 const Case& find(const std::string& name) {
   static std::map<std::string, Case> cases;
   const auto known = cases.find(name);
@@ -32,7 +32,7 @@ const Case& find(const std::string& name) {
 }
 
 void time(const Case& c, int count) {
-  // Reading the clock takes about a fifth of a microsecond: short cases are timed many at once.
+  // Reading the clock takes about a fifth of a microsecond: short cases are timed many at a time.
   constexpr std::int64_t kShortest_ns = 50'000;
   c.once();
   const std::int64_t warm = thread_ns();

@@ -1,4 +1,4 @@
-// What TLS costs the thread that sends frames: its CPU time a frame over plain TCP, TLS and a Unix
+// Cost of TLS on the thread that sends frames: its CPU time a frame over plain TCP, TLS and a Unix
 // socket, rounds interleaved, one client that reads as fast as it can.
 //   bench_tls [FRAMES a round] [ROUNDS]
 #include <fmt/format.h>
@@ -63,7 +63,7 @@ class Served {
   std::thread thread_;
 };
 
-/// A stream of messages over a socket, with TLS over it or not.
+/// A stream of messages over a socket, with TLS or without.
 class Stream {
  public:
   Stream(base::UniqueFd fd, bool tls) : fd_(std::move(fd)) {
@@ -91,7 +91,7 @@ class Stream {
     if (sent != size) throw std::runtime_error("the request was not sent");
     (void)receive();
   }
-  /// Bytes of the next message.
+  /// Number of bytes of the next message.
   std::size_t receive() {
     while (decoder_.feed(unread_) != wire::MessageDecoder::Result::message) {
       const auto n = ssl_ != nullptr
@@ -134,7 +134,7 @@ base::UniqueFd over_unix(const std::string& path) {
   return connected(AF_UNIX, reinterpret_cast<const sockaddr*>(&address), sizeof address);
 }
 
-/// One way to be connected, kept open over all rounds.
+/// One kind of connection, kept open over all rounds.
 struct Way {
   const char* name;
   Served& served;
@@ -182,7 +182,7 @@ void measure(int frames, int rounds) {
   v1::ClientMessage end;
   end.mutable_subscribe();
   for (auto& way : ways) way.stream.request(hello);
-  // The default scene's map at full resolution, and what an encoding makes of it.
+  // Sizes of the default scene's map at full resolution, raw and encoded.
   for (const std::uint32_t side : {580U, 241U}) {
     std::map<std::string, std::vector<double>> times;
     for (int round = 0; round < rounds; ++round) {

@@ -1,4 +1,4 @@
-// The daemon in a network whose address comes after the daemon, as by DHCP.
+// The daemon in a network whose address comes after the daemon's start, as with DHCP.
 #include <arpa/inet.h>
 #include <gtest/gtest.h>
 #include <linux/ipv6.h>
@@ -25,15 +25,15 @@
 namespace dtact::e2e {
 namespace {
 
-// From the ranges for documentation (RFC 5737, RFC 3849): unused.
+// Addresses from the ranges for documentation (RFC 5737, RFC 3849): unused.
 constexpr const char* kIpv4 = "192.0.2.7";
 constexpr const char* kIpv6 = "2001:db8::7";
 
-/// This program and what it starts get a network of their own, in which loopback alone is up.
+/// This program and its children get a network namespace in which only loopback is up.
 class LateAddress : public ::testing::Test {
  protected:
   void SetUp() override {
-    // Whoever is not root becomes it in a user namespace, where one may be made.
+    // Without root's rights this needs a user namespace, where one may be made.
     if (::unshare(CLONE_NEWNET) != 0 && ::unshare(CLONE_NEWUSER | CLONE_NEWNET) != 0) {
       GTEST_SKIP() << "no network namespace can be made here: " << std::strerror(errno);
     }
@@ -73,7 +73,7 @@ class LateAddress : public ::testing::Test {
     }
   }
 
-  /// The daemon serves nobody before `bring` and a client after it.
+  /// The daemon serves no client before `bring` and serves one after it.
   void serves_once_it_comes(const std::string& address, const std::function<void()>& bring) {
     const TempFolder state;
     DaemonProcess daemon({"--set", "camera.backend=null", "--set", "ring.backend=null", "--set",

@@ -115,7 +115,7 @@ void Besieged::end(const std::string& attack) {
   EXPECT_TRUE(honest_.receives(30)) << honest_.broken();
   const double attacked_p99_ms = honest_.take_p99_ms();
   const std::int64_t peak_kib = held_by(pid()).peak_kib;
-  // What peers left behind ends with their connections, the last of them with a time-out.
+  // Descriptors of peers close with their connections, the last of them after a time-out.
   EXPECT_TRUE(wait_for([&] { return held_by(pid()).descriptors <= before_.descriptors; }))
       << held_by(pid()).descriptors << " descriptors, before " << before_.descriptors;
   (void)wait_for(

@@ -13,15 +13,15 @@
 
 namespace dtact::e2e {
 
-/// How much more a daemon may hold than before, afterwards and where nothing is to be held.
+/// Limits of growth after an attack, where nothing may be held.
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-// They keep up to 256 MiB of what was freed, to see who still uses it (quarantine_size_mb).
+// Sanitizers keep up to 256 MiB of freed memory, to detect its use (quarantine_size_mb).
 inline constexpr std::int64_t kMemorySlackKib = (256 + 8) * 1024;
 #else
 inline constexpr std::int64_t kMemorySlackKib = 8 * 1024;
 #endif
 
-/// What a process holds, as the kernel counts it.
+/// Resources of a process, as the kernel counts them.
 struct Held {
   std::int64_t resident_kib = 0;  ///< VmRSS; with ONFAULT that is also what is locked.
   std::int64_t peak_kib = 0;      ///< VmHWM, since forget_peak().
@@ -38,9 +38,9 @@ class HonestClient {
   HonestClient(const HonestClient&) = delete;
   HonestClient& operator=(const HonestClient&) = delete;
 
-  /// Waits for so many frames more. False when the connection broke or none came for a minute.
+  /// Waits for `frames` more frames. False when the connection broke or none came for a minute.
   [[nodiscard]] bool receives(std::size_t frames) const;
-  /// From capture to here of all frames since the last call, 99th percentile, milliseconds.
+  /// Latency from capture to here of all frames since the last call, 99th percentile, milliseconds.
   [[nodiscard]] double take_p99_ms();
   /// Why the connection ended; empty while it lives.
   [[nodiscard]] std::string broken() const;
@@ -57,7 +57,7 @@ class HonestClient {
   std::thread thread_;
 };
 
-/// A daemon on the simulated sensor with an honest client, before and after something hostile.
+/// A daemon on the simulated sensor with an honest client, before and after an attack.
 class Besieged {
  public:
   Besieged();
@@ -67,13 +67,13 @@ class Besieged {
   [[nodiscard]] pid_t pid() const { return sensor_.daemon->pid(); }
   [[nodiscard]] HonestClient& honest() { return honest_; }
 
-  /// As noted by begin().
+  /// Resources noted by begin().
   [[nodiscard]] const Held& before() const { return before_; }
 
-  /// Notes how things are, from a second of peace.
+  /// Notes the state after a second without an attack.
   void begin();
   /// Asserts that nothing of the attack is left: memory, descriptors, the honest client, service
-  /// for newcomers. Prints what it cost; a loaded machine misses frames by itself, so that is no
+  /// for new clients. Prints the cost; a loaded machine misses frames by itself, which is not a
   /// failure.
   void end(const std::string& attack);
 

@@ -1,4 +1,4 @@
-// Calibrations on a running daemon, and dtactctl as a user meets it.
+// Calibrations on a running daemon, and dtactctl as a user runs it.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -28,7 +28,7 @@ v1::UploadCalibration upload_of(const v1::CalibrationFiles& files) {
   return upload;
 }
 
-/// dtactctl against this daemon; its exit status and what it printed.
+/// Runs dtactctl against this daemon; returns its exit status and output.
 int ctl(const Sensor& sensor, std::vector<std::string> arguments, std::string* output = nullptr) {
   arguments.insert(arguments.begin(),
                    {DTACTCTL_PROGRAM, "--port", std::to_string(sensor.daemon->port())});
@@ -87,7 +87,7 @@ TEST(Calibration, BadUploadIsRefusedAndChangesNothing) {
   EXPECT_EQ(client.calibration().calibration_toml(), good.calibration_toml());
 }
 
-/// The next frames with depth have pixels of this size, which tells the calibrations apart.
+/// Whether the next frames with depth have pixels of this size, which differs between calibrations.
 bool depth_flows_at(client::Client& client, double mm_per_px) {
   return read_until(client, [mm_per_px](const Item& item) {
     const auto* frame = std::get_if<v1::Frame>(&item);
@@ -102,8 +102,8 @@ bool is_reported(client::Client& client, const std::string& name) {
   });
 }
 
-/// A sensor with a configured calibration and, in use, an uploaded one, "other", number 1, that is
-/// like it but for the size of its pixels.
+/// A sensor with a configured calibration and an uploaded one, "other", number 1, in use. They
+/// differ in the size of their pixels only.
 class TwoCalibrations : public testing::Test {
  protected:
   static constexpr double kConfigured = 0.0413793;  // tests/e2e/sensor.cpp
@@ -121,7 +121,7 @@ class TwoCalibrations : public testing::Test {
     client.upload_calibration(files);
   }
 
-  /// The list as dtactctl prints it.
+  /// The list that dtactctl prints.
   [[nodiscard]] std::string list() const {
     std::string output;
     EXPECT_EQ(ctl(sensor_, {"calibration", "list"}, &output), 0) << output;

@@ -55,7 +55,7 @@ int count_frames(client::Client& client, int wanted) {
 
 TEST(Clients, SixteenOfWhichOneNeverReads) {
   const Sensor sensor;
-  // Says hello by the library and asks for frames, then never reads again.
+  // Says Hello with the library and subscribes to frames, then never reads again.
   client::Client deaf = sensor.connect("deaf");
   deaf.subscribe();
   std::vector<std::unique_ptr<client::Client>> clients;
@@ -72,7 +72,7 @@ TEST(Clients, SixteenOfWhichOneNeverReads) {
   }
   for (std::thread& thread : threads) thread.join();
   for (const int n : frames) EXPECT_EQ(n, 180);
-  // The daemon answers at once, and knows who did not read.
+  // The daemon answers at once, and reports which client did not read.
   const v1::Status status = clients[0]->status();
   EXPECT_EQ(status.clients_size(), 16);
   for (const auto& c : status.clients()) {
@@ -88,7 +88,7 @@ TEST(Clients, OneThatReadsLateGetsTheNewestFrames) {
   luma.set_luma(v1::LUMA_GREY8);
   client::Client late = sensor.connect("late");
   late.subscribe(luma);
-  // Whoever reads quickly is given a larger buffer by the kernel.
+  // The kernel gives a fast reader a larger buffer.
   ASSERT_EQ(count_frames(late, 120), 120);
   client::Client prompt = sensor.connect("prompt");
   prompt.subscribe();
@@ -135,7 +135,7 @@ TEST(Clients, MalformedAndOversizedMessagesEndOnlyTheirConnection) {
   const Sensor sensor;
   client::Client client = sensor.connect();
   client.subscribe();
-  // A length above the cap; a message that is no protobuf; another protocol; nothing but a length.
+  // Length above the cap, no protobuf, another protocol, only a length.
   EXPECT_NE(talk(sensor.daemon->port(), std::string("\xff\xff\xff\xff", 4)), "");
   EXPECT_NE(talk(sensor.daemon->port(), std::string("\0\0\0\4\xff\xff\xff\xff", 8)), "");
   EXPECT_NE(talk(sensor.daemon->port(), "GET / HTTP/1.1\r\n\r\n"), "");

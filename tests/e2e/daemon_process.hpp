@@ -13,7 +13,7 @@
 
 namespace dtact::e2e {
 
-/// A dtactd of the test's own on a port that the system chose. Started the way systemd
+/// A dtactd on a port that the system chose. Started the way systemd
 /// starts it: ready when it says READY=1 on its notify socket.
 class DaemonProcess {
  public:
@@ -24,12 +24,12 @@ class DaemonProcess {
   [[nodiscard]] std::uint16_t port() const { return port_; }
   [[nodiscard]] pid_t pid() const { return program_.pid(); }
   [[nodiscard]] std::string log() const { return program_.log(); }
-  /// What the daemon tells systemd next; none when nothing comes in time.
+  /// The daemon's next message to systemd; nothing when none comes in time.
   [[nodiscard]] std::optional<std::string> next_notification(
       std::chrono::milliseconds timeout) const {
     return notify_.next(timeout);
   }
-  /// As Program::stop().
+  /// See Program::stop().
   int stop(int signal) { return program_.stop(signal); }
 
  private:

@@ -11,12 +11,12 @@
 
 namespace dtact::e2e {
 
-/// How far a streamed depth map is from the simulator's truth.
+/// Error of a streamed depth map against the simulator's truth.
 struct DepthError {
   double inside_mm = 0;   ///< Mean absolute error inside the true contact; NaN without contact.
   double outside_mm = 0;  ///< The same everywhere else.
   int inside_pixels = 0;  ///< Pixels of the true contact.
-  int untrusted = 0;      ///< Of them, those not to be believed.
+  int untrusted = 0;      ///< Untrusted pixels of the true contact.
 };
 
 inline DepthError depth_error(const v1::Frame& frame, const hal::sim::Truth& truth) {

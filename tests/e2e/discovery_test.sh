@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# A real avahi-daemon on a bus and in a network of its own, in which loopback alone is up: dtactd
+# A real avahi-daemon on a bus and in a network namespace in which only loopback is up: dtactd
 # announces itself there and dtactctl finds it. discovery_test.sh DTACTD DTACTCTL
 set -euo pipefail
 daemon=$1 ctl=$2
@@ -26,7 +26,7 @@ finish() {
 trap finish EXIT
 
 fail() { echo "FAILED: $1"; exit 1; }
-# within SECONDS COMMAND...: until it succeeds.
+# within SECONDS COMMAND...: repeats the command until it succeeds.
 within() {
   local end=$((SECONDS + $1))
   shift
@@ -42,7 +42,7 @@ start_avahi() {
   avahi=$!
   jobs+=("$avahi")
 }
-# start_daemon NAME SETTING...: a dtactd of its own.
+# start_daemon NAME SETTING...: starts another dtactd.
 start_daemon() {
   local name=$1 settings=()
   shift
@@ -54,7 +54,7 @@ start_daemon() {
 }
 
 mount -t tmpfs none /run
-# avahi-daemon gives its folder in /run to its own user, and in here there is no user but one.
+# avahi-daemon gives its folder in /run to its own user, and this namespace has only one user.
 for file in passwd group; do
   sed -E 's/^avahi:x:[0-9]+:([0-9]+:)?/avahi:x:0:\1/; s/^avahi:x:0:[0-9]+:/avahi:x:0:0:/' "/etc/$file" >"$folder/$file"
   mount --bind "$folder/$file" "/etc/$file"
@@ -73,13 +73,13 @@ dbus-daemon --session --nofork --address="$DBUS_SYSTEM_BUS_ADDRESS" >"$folder/bu
 jobs+=($!)
 within 10 test -S "$folder/bus"
 
-# Without avahi-daemon: nothing is started, the daemon runs, the client says what is missing.
+# Without avahi-daemon: the daemon runs without announcing, the client says what is missing.
 start_daemon first net.address=192.0.2.7
 within 30 says first 'not announced until avahi-daemon runs'
 ! "$ctl" find >"$folder/find.log" 2>&1 || fail 'found something without avahi-daemon'
 says find 'no avahi-daemon to ask' || fail 'no word of avahi-daemon'
 
-# One that comes later is seen, and so is one that starts anew.
+# An avahi-daemon that comes later is seen, and so is one that restarts.
 start_avahi
 within 60 says first 'announced as "'
 within 60 "$ctl" find --json >"$folder/find.log"
@@ -93,7 +93,7 @@ start_avahi
 within 60 "$ctl" find >"$folder/find.log"
 says find "--host 192.0.2.7 --port $port" || fail 'not found again'
 
-# Two of one name get along; what listens on loopback alone, or must not, is not announced.
+# Two daemons of one name coexist; one on loopback only, or with announcing off, is not announced.
 start_daemon second net.address=0.0.0.0
 within 60 says second '#2" (_dtact._tcp'
 start_daemon alone
@@ -103,7 +103,7 @@ start_daemon quiet net.address=192.0.2.7 net.announce=false
 ! says alone announced || fail 'announced from loopback'
 ! says quiet announced || fail 'announced against its configuration'
 
-# What ends is gone.
+# A daemon that ends disappears.
 kill "${jobs[1]}"
 gone() { "$ctl" find --json >"$folder/find.log"; (($(wc -l <"$folder/find.log") == 1)); }
 within 30 gone

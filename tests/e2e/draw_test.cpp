@@ -1,4 +1,4 @@
-// dtactctl watch --draw in a terminal of its own.
+// dtactctl watch --draw in a pseudo-terminal.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <poll.h>

@@ -1,4 +1,4 @@
-// A camera whose exposure is automatic, and how long a light change takes.
+// A camera with automatic exposure, and the time that a light change takes.
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -23,7 +23,7 @@ std::filesystem::path write_scene(const TempFolder& folder, const std::string& t
   return file;
 }
 
-/// An exposure that follows the picture, and something that covers a part of the picture for five
+/// An exposure that follows the picture, and an object that covers a part of the picture for five
 /// seconds of every ten, with sanitizers longer. The daemon must see the picture uncovered first,
 /// however late it starts.
 std::string covered_again_and_again() {
@@ -42,7 +42,7 @@ TEST(Exposure, ThatFollowsThePictureIsNamedThoughTheCameraCallsItLocked) {
   v1::Subscribe summary;
   summary.set_summary(true);
   client.subscribe(summary);
-  // The status has a frame's conditions by the time of the next frame.
+  // The status has a frame's health flags by the time of the next frame.
   int frames = 0;
   ASSERT_TRUE(read_until(client, [&](const Item& item) {
     const auto* frame = std::get_if<v1::Frame>(&item);
@@ -61,8 +61,8 @@ std::vector<std::string> small_mode() {
 
 TEST(LightDelay, IsMeasuredAndTheLightIsAsBefore) {
   const TempFolder folder;
-  // Complete in the sixth frame whose exposure begins after the change, or in the one before where
-  // the device had not begun it yet: five show the old light.
+  // Complete in the sixth frame whose exposure begins after the change, or in the one before if the
+  // device had not begun that frame: five show the old light.
   const Sensor sensor(write_scene(folder, "[camera]\nlight_delay_frames = 6\n"), false,
                       small_mode());
   const std::string port = std::to_string(sensor.daemon->port());

@@ -1,5 +1,5 @@
-// The guided calibration by piped input, on a scene in which a ball is pressed again and again, and
-// what the calibration measures then.
+// The guided calibration with piped input, on a scene in which a ball is pressed repeatedly, and
+// the error of the depth that the calibration measures then.
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -32,7 +32,7 @@ constexpr int kNotMet = 4;
 
 std::string enters(int count) { return std::string(static_cast<std::size_t>(count), '\n'); }
 
-/// `dtact-calibrate guided` in the sensor's folder, with these lines typed.
+/// Runs `dtact-calibrate guided` in the sensor's folder with these lines typed.
 int guide(const Sensor& sensor, const std::string& typed, std::string* output,
           const std::vector<std::string>& more = {}) {
   std::vector<std::string> arguments = {CALIBRATE_PROGRAM,
@@ -58,7 +58,7 @@ bool there(const Sensor& sensor, const std::string& name) {
 }
 
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-// Programs with sanitizers that share a core keep up with no more whole pictures.
+// Programs with sanitizers that share a core cannot process whole pictures faster.
 constexpr unsigned kFps = 20;
 #else
 constexpr unsigned kFps = 60;
@@ -89,7 +89,7 @@ TEST(Guided, FromNothingToACalibrationThatMeasuresAnotherBall) {
   const TempFolder folder;
   Sensor sensor(presses(folder), false, {rate()});
   std::string output;
-  // More than are needed: a press may come out too light, or its like have been taken.
+  // More than needed: a press may be too light, or one of its depth may have been taken.
   ASSERT_EQ(guide(sensor, enters(60), &output), kDone) << output;
   EXPECT_THAT(output, AllOf(HasSubstr("Step 1 of 3"), HasSubstr("press-06 taken"),
                             HasSubstr("the daemon uses calibration ball from now on")));
@@ -115,7 +115,7 @@ TEST(Guided, FromNothingToACalibrationThatMeasuresAnotherBall) {
         if (frame == nullptr || !frame->has_depth()) return false;
         EXPECT_FALSE(has(frame->health(), v1::HEALTH_CAMERA_MISMATCH));
         EXPECT_FALSE(has(frame->health(), v1::HEALTH_LIGHT_MISMATCH));
-        // In the scene's loop of twelve seconds: its ball, not the nut. Six frames a second.
+        // In the scene's loop of twelve seconds this is its ball, not the nut. Six frames a second.
         const std::uint64_t place = frame->sequence() % (12 * kFps);
         if (4 * place > 23 * kFps || frame->sequence() < judged + kFps / 6) return false;
         judged = frame->sequence();
@@ -134,7 +134,7 @@ TEST(Guided, FromNothingToACalibrationThatMeasuresAnotherBall) {
   std::printf(
       "ball of 5 mm, simulated sensor, guided calibration with 6 presses of a 4 mm ball: mean "
       "absolute error inside the true contact %.4f mm (median of %zu frames), worst frame %.4f mm; "
-      "untouched %.4f mm at most (%d frames)\n",
+      "without contact %.4f mm at most (%d frames)\n",
       inside[inside.size() / 2], inside.size(), worst, worst_no_contact, no_contact);
   EXPECT_LE(worst, 0.05);
   EXPECT_LE(worst_no_contact, 0.01);

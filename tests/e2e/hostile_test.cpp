@@ -1,6 +1,6 @@
-// Peers that mean harm, or behave as if: one daemon stands all of them one after another while an
-// honest client streams. What a test machine's load does by itself (missed frames, delays) is
-// measured and printed; what the daemon must do on any machine is asserted.
+// Hostile peers, and peers that behave like them: one daemon stands all of them one after another
+// while an honest client streams. Effects of a test machine's load (missed frames, delays) are
+// measured and printed; requirements that hold on any machine are asserted.
 #include <fcntl.h>
 #include <gtest/gtest.h>
 #include <netinet/in.h>
@@ -36,7 +36,7 @@ class Hostile : public testing::Test {
  protected:
   static void SetUpTestSuite() {
     daemon = new Besieged;
-    // Only after the daemon has its own limit.
+    // The daemon has set its own limit before.
     rlimit limit{};
     ::getrlimit(RLIMIT_NOFILE, &limit);
     limit.rlim_cur = std::min<rlim_t>(limit.rlim_max, 8192);
@@ -50,7 +50,7 @@ class Hostile : public testing::Test {
 };
 Besieged* Hostile::daemon = nullptr;
 
-/// A connection on which nothing waits for long.
+/// A connection on which no call waits long.
 base::UniqueFd knock() {
   base::UniqueFd fd(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0));
   sockaddr_in address{};
@@ -76,8 +76,8 @@ void reset(base::UniqueFd fd) {
   ::setsockopt(fd.get(), SOL_SOCKET, SO_LINGER, &now, sizeof now);
 }
 
-/// What the daemon says before it ends the connection: the code of its last error, ERROR_NONE when
-/// it says nothing. A silence of a minute counts as kept.
+/// The daemon's last error code before it ends the connection; ERROR_NONE without an error. A
+/// silence of a minute counts as kept.
 constexpr int kKept = -1;
 int last_word(const base::UniqueFd& fd) {
   wire::MessageDecoder decoder;
@@ -96,7 +96,7 @@ int last_word(const base::UniqueFd& fd) {
   }
 }
 
-/// The first reply, or nothing when the daemon ends the connection without.
+/// The first reply, or nothing when the daemon ends the connection without one.
 std::optional<v1::Reply> first_answer(const base::UniqueFd& fd) {
   wire::MessageDecoder decoder;
   char byte = 0;
@@ -168,14 +168,14 @@ TEST_F(Hostile, ThousandsAtOnce) {
   }
   EXPECT_GT(served, 0);
   EXPECT_EQ(served + reported, 4000) << "some were refused without a word";
-  std::printf("of 4000 at once %d were served and %d of the others told why not\n", served,
+  std::printf("of 4000 at once %d were served and %d of the others got the reason\n", served,
               reported);
   peers.clear();
   daemon->end("4000 connections at once");
 }
 
 TEST_F(Hostile, SixteenMebibytesBeforeHello) {
-  // What they announce is within the cap of a message, and a mebibyte of it really comes.
+  // The announced length is within the cap of a message, and a mebibyte of it is sent.
   const std::string bytes = std::string("\x01\x00\x00\x00", 4) + std::string(1 << 20, 'x');
   std::vector<base::UniqueFd> peers;
   for (int i = 0; i < 200; ++i) {
@@ -196,8 +196,8 @@ TEST_F(Hostile, FloodOfRequests) {
   v1::ClientMessage request;
   request.set_id(7);
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-  // A status takes so long there that the daemon makes hardly more of them than it allows, and ends
-  // the connection for the answers that lie unread.
+  // With sanitizers a status takes so long that the daemon makes few more of them than it allows,
+  // and ends the connection for the answers that lie unread.
   request.mutable_ping();
 #else
   request.mutable_get_status();
@@ -227,7 +227,7 @@ TEST_F(Hostile, SlowReaders) {
     slow.back().subscribe(v1::DEPTH_INT16);
   }
   ASSERT_TRUE(daemon->honest().receives(240)) << daemon->honest().broken();
-  // Each is still served once it reads, and is told what it missed.
+  // Each client is still served once it reads, and its next frame counts what it missed.
   for (auto& client : slow) {
     while (client.frame().dropped() == 0) {
     }

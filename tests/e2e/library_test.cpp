@@ -1,4 +1,4 @@
-// The installed C++ library as its users meet it: the example of clients/cpp/README.md, built with
+// The installed C++ library as its users build with it: the example of clients/cpp/README.md, with
 // CMake and with pkg-config, against a daemon on the simulated sensor.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -94,7 +94,7 @@ TEST_F(Library, IsFoundByPkgConfig) {
   expect_depth(program);
 }
 
-// Of names without a namespace there is the version's own.
+// Exported names without a namespace: only the version's own.
 TEST_F(Library, ExportsItsOwnNamesOnly) {
   const std::string names =
       output_of("nm -DC --defined-only '" + (libraries() / "libdtact.so").string() + "'");

@@ -2,7 +2,7 @@
 
 namespace dtact::e2e {
 
-/// How many times as long programs with sanitizers may take, as in tests/CMakeLists.txt.
+/// Factor of the time that programs with sanitizers may take, as in tests/CMakeLists.txt.
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 inline constexpr int kSlower = 5;
 #else

@@ -1,5 +1,5 @@
-// dtact-perceive beside a daemon on the simulated sensor: what it serves, and what moves, against
-// what was pressed in.
+// dtact-perceive beside a daemon on the simulated sensor: its messages and motion, compared with
+// the pressed object.
 #include "tests/e2e/perceive.hpp"
 
 #include <gtest/gtest.h>
@@ -36,7 +36,7 @@ TEST(Perceive, FollowsASlidingBallWithoutItsRotation) {
         const v1::ObjectPose& pose = frame->pose();
         if (pose.tracking() == v1::ObjectPose::STARTED) since = frame->sequence();
         if (since == 0 || pose.since_sequence() != since) return false;
-        // The slide, from where it was held on.
+        // The slide, from the held position on.
         const double t = press.time_s(frame->sequence());
         if (t < 4.2 || t > 11.9) return false;
         ++(pose.tracking() == v1::ObjectPose::TRACKED ? tracked : others);

@@ -1,4 +1,4 @@
-// dtact-perceive's points of the simulated sensor, against what was pressed in.
+// dtact-perceive's points of the simulated sensor, compared with the pressed object.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -44,7 +44,7 @@ TEST(Points, OfTheContactDuringContact) {
       std::chrono::seconds(60)));
 }
 
-/// A sensor whose surface is curved, and what its calibration says of that.
+/// A sensor with a curved surface, and its calibration's surface model.
 struct Finger {
   const char* name;
   const char* scene;
@@ -52,7 +52,7 @@ struct Finger {
 };
 void PrintTo(const Finger& finger, std::ostream* out) { *out << finger.name; }
 
-/// The part of the map that holds the contact wherever the ball is held: where threads are watched,
+/// The part of the map with the contact wherever the ball is held: under the thread sanitizer
 /// a whole map's points take many seconds.
 constexpr std::size_t kBoxColumn = 165;
 constexpr std::size_t kBoxRow = 90;
@@ -60,7 +60,7 @@ constexpr std::size_t kBoxSide = 195;
 
 class PointsOfABall : public testing::TestWithParam<Finger> {};
 
-/// Mean distance of the points that touch from the ball, and the middle one of their normals'
+/// Mean distance from the ball of the points in contact, and the median of their normals'
 /// errors.
 struct PointsError {
   double mm = 0;

@@ -15,11 +15,11 @@
 
 namespace dtact::e2e {
 
-/// Of the ball of Press.
+/// Radius of the ball of Press.
 inline constexpr double kRadiusMm = 4;
 
-/// A ball goes in over a second, is held for four, and then slides by a millimetre, again and
-/// again; with sanitizers kSlower times as slowly, so that a search ends while it is held.
+/// A ball goes in over a second, is held for four, and then slides by a millimetre, repeatedly.
+/// With sanitizers all takes kSlower times as long, so that a search ends while it is held.
 struct Press {
   /// `surface`: lines of a scene before the rest.
   explicit Press(const TempFolder& folder, const std::string& surface = "")
@@ -45,8 +45,8 @@ keys = [
                                                             at(8), at(10), at(12), at(13)));
     scene = hal::sim::load_scene(file);
   }
-  /// When a frame is taken, sanitizers or not: the ball is pressed in from 3 to 4, held to 8, slid
-  /// to 10 and held to 12.
+  /// Time of a frame without sanitizers' factor: the ball is pressed in from 3 to 4, held to 8,
+  /// slid to 10 and held to 12.
   [[nodiscard]] double time_s(std::uint64_t sequence) const {
     return scene.time_s(sequence) / kSlower;
   }

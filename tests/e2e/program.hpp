@@ -9,7 +9,7 @@
 
 namespace dtact::e2e {
 
-/// A folder of the test's own, removed with it.
+/// A temporary folder, removed at the end.
 class TempFolder {
  public:
   TempFolder();
@@ -30,7 +30,7 @@ int run_program(const std::vector<std::string>& arguments, std::string* output =
 /// Variables beside those of this program.
 using Environment = std::vector<std::pair<std::string, std::string>>;
 
-/// A program that runs until it is stopped. It reads nothing.
+/// A program that runs until it is stopped, without input.
 class Program {
  public:
   /// `arguments`: its file first. `environment` adds to this program's.
@@ -40,9 +40,9 @@ class Program {
   ~Program();
 
   [[nodiscard]] pid_t pid() const { return pid_; }
-  /// Whether it has ended by itself.
+  /// Whether it has ended without stop().
   [[nodiscard]] bool ended();
-  /// What it has printed on both streams.
+  /// Its output on both streams so far.
   [[nodiscard]] std::string log() const;
   /// Sends `signal` and waits. Returns the exit status, 128 + signal when it was killed, or −1 when
   /// it did not end within 20 s (it is killed then).

@@ -50,7 +50,7 @@ class Record : public testing::Test {
     ::waitpid(pid, &status, 0);
     return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
   }
-  /// Until chunks have been written.
+  /// Waits until chunks have been written.
   void wait_for_bytes(std::uintmax_t bytes) const {
     std::error_code missing;
     for (int i = 0; i < 600; ++i) {
@@ -146,7 +146,7 @@ TEST_F(Record, SigkillLosesTheOpenChunkOnly) {
 }
 
 TEST_F(Record, AFullDiskEndsTheRecordingAndNotTheDaemon) {
-  // A limit of 3 MB on the file stands in for the disk.
+  // A limit of 3 MB on the file plays a full disk.
   std::vector<std::string> limited = {"/bin/bash", "-c", "ulimit -f 3000; exec \"$0\" \"$@\""};
   const auto recorder = command();
   limited.insert(limited.end(), recorder.begin(), recorder.end());
@@ -154,7 +154,7 @@ TEST_F(Record, AFullDiskEndsTheRecordingAndNotTheDaemon) {
   EXPECT_EQ(run_program(limited, &said), 1);
   EXPECT_THAT(said, HasSubstr("the recording ended early: " + file.string() + ": File too large"));
   EXPECT_LE(fs::file_size(file), 3000U * 1024);
-  // Whether the index still fitted is chance; what was written can be read.
+  // Whether the index still fitted is chance; the written chunks are readable.
   EXPECT_FALSE(mcap::Reader(file).attachments().empty());
   EXPECT_NO_THROW((void)frames_of(mcap::Reader(file)));
   client::Client client = sensor.connect();
@@ -180,8 +180,8 @@ TEST_F(Record, AFileIsNotReplacedUnasked) {
 }
 
 // The same calibration, the recorded JPEGs and the recorded reference give the recorded depth, bit
-// for bit, but for cells at the edge of activity: what the daemon had seen before the recording
-// began (noise, hysteresis) is not in it, and a tile that one of the two left out is 0 there.
+// for bit, except at the edge of activity: the daemon's state before the recording (noise,
+// hysteresis) is not in it, and a tile that only one of the two computed is 0 in the other.
 TEST_F(Record, TheSameCalibrationMakesTheSameDepthAnew) {
   std::string said;
   ASSERT_EQ(run_program(command({"--seconds", "5"}), &said), 0) << said;
@@ -201,7 +201,7 @@ TEST_F(Record, TheSameCalibrationMakesTheSameDepthAnew) {
   std::size_t made = 0;  // in both
   std::size_t made_equal = 0;
   int worst = 0;
-  std::vector<double> apart;  // stated uncertainties
+  std::vector<double> apart;  // in stated uncertainties
   for (const auto& [sequence, frame] : recorded) {
     const v1::Frame& other = remade.at(sequence);
     ASSERT_EQ(frame.has_depth(), other.has_depth()) << sequence;
@@ -264,7 +264,7 @@ TEST_F(Record, WithoutJpegsDepthCannotBeMadeAnew) {
   EXPECT_THAT(said, HasSubstr("no frame of it holds a JPEG"));
 }
 
-// Recorded before there was a calibration; there is no contact in this scene.
+// The frames were recorded without a calibration; this scene has no contact.
 TEST(RecordUncalibrated, GetsItsDepthFromFramesThatWereWithoutContact) {
   const Sensor sensor(scene_file("nothing.toml"), false);
   const TempFolder folder;

@@ -31,7 +31,7 @@ std::filesystem::path write_scene(const TempFolder& folder) {
   return file;
 }
 
-/// Waits for a frame with depth in which there is contact, or nothing.
+/// Waits for a frame with depth that has contact, or has none.
 bool wait_contact(client::Client& client, bool in_contact) {
   return read_until(client, [&](const Item& item) {
     const auto* frame = std::get_if<v1::Frame>(&item);
@@ -46,7 +46,7 @@ bool wait_reference(client::Client& client) {
   });
 }
 
-/// Depth inside the true contact of the next fully pressed frame, and the truth's, millimetres.
+/// Depth inside the true contact of the next fully pressed frame, and the true depth, millimetres.
 struct Pressed {
   double depth_mm = 0;
   double truth_mm = 0;
@@ -176,7 +176,7 @@ TEST(Reference, InContactAtStartServesWithTheLastGoodOneAndSaysSo) {
     const auto* event = std::get_if<v1::Event>(&item);
     return event != nullptr && event->has_reference() && !event->reference().restored();
   }));
-  // The event may be told before the first frame that is measured against it.
+  // The event may come before the first frame that is measured against it.
   EXPECT_TRUE(read_until(client, [](const Item& item) {
     const auto* frame = std::get_if<v1::Frame>(&item);
     return frame != nullptr && !has(frame->health(), v1::HEALTH_REFERENCE_RESTORED);

@@ -1,4 +1,4 @@
-// SIGHUP: what a running daemon takes from a configuration that is read again.
+// SIGHUP: the settings that a running daemon applies when it reads its configuration again.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <signal.h>
@@ -60,7 +60,7 @@ class Reload : public testing::Test {
            "tokens = 'tokens'\ntls_certificate = '" +
            pair + "/dtactd.crt'\ntls_key = '" + pair + "/dtactd.key'\n" + more;
   }
-  /// Sends SIGHUP. Returns the status that the service manager is told when it is done.
+  /// Sends SIGHUP. Returns the status that the service manager receives when the reload is done.
   [[nodiscard]] std::string reload() const {
     EXPECT_EQ(::kill(daemon_->pid(), SIGHUP), 0);
     bool reloading = false;
@@ -103,7 +103,7 @@ TEST_F(Reload, TakesCertificateTokensAndLimits) {
   EXPECT_THROW((void)connect(old_, kNewToken), client::ConnectionError);
   const auto after = connect(renewed, kNewToken);
   EXPECT_EQ(after->server().rights(), v1::RIGHTS_VIEW);
-  // Who was there before stays, as what he was.
+  // An earlier client stays, with its rights.
   EXPECT_EQ(before->status().endpoints(0).fingerprint(), renewed);
   EXPECT_THROW((void)connect(renewed, kNewToken), client::EndedByDaemon);  // the third
 }
@@ -114,14 +114,14 @@ TEST_F(Reload, AMistakeLeavesEverythingAsItWas) {
   EXPECT_THAT(reload(),
               AllOf(HasSubstr("the configuration stays as it was: "), HasSubstr(mistake)));
   EXPECT_THAT(daemon_->log(), HasSubstr(mistake));
-  // As well one that shows only in the files it names.
+  // The same for a mistake that only the named files have.
   write("dtactd.toml", configuration("old", "max_clients = 1\n"));
   write("tokens", "control short\n");
   EXPECT_THAT(reload(), HasSubstr("tokens:1: the token has 5 bytes"));
   const auto one = connect(old_, kOldToken);
   const auto two = connect(old_, kOldToken);
   EXPECT_EQ(two->server().rights(), v1::RIGHTS_CONTROL);
-  // Fixed, all is well again.
+  // Once fixed, the reload succeeds.
   write("tokens", std::string("control ") + kOldToken + "\n");
   EXPECT_THAT(reload(), Not(HasSubstr("stays")));
   EXPECT_THROW((void)connect(old_, kOldToken), client::EndedByDaemon);  // max_clients = 1
@@ -146,7 +146,7 @@ TEST_F(Reload, SaysThatNewCredentialsNeedARestart) {
   EXPECT_EQ(connect(old_, kOldToken)->server().rights(), v1::RIGHTS_CONTROL);
 }
 
-/// Runs dtactd to its end, which is a failure. Returns what it says to the service manager first.
+/// Runs dtactd until it fails. Returns its first message to the service manager.
 std::optional<std::string> reported_by_failing(std::vector<std::string> arguments,
                                                std::string& output) {
   const TempFolder folder;
@@ -158,7 +158,7 @@ std::optional<std::string> reported_by_failing(std::vector<std::string> argument
   return manager.next(std::chrono::milliseconds(0));  // it has ended
 }
 
-// systemd takes messages of the main process alone, and complains of others.
+// systemd accepts messages of the main process only, and complains of others.
 TEST(Check, ReportsTheServiceManagerNothing) {
   std::string output;
   EXPECT_EQ(reported_by_failing({"--check-config", "--set", "camera.width=1"}, output),
@@ -166,7 +166,7 @@ TEST(Check, ReportsTheServiceManagerNothing) {
   EXPECT_THAT(output, HasSubstr("camera.width"));
 }
 
-// What systemctl status shows of a daemon that cannot start.
+// The status that systemctl shows of a daemon that cannot start.
 TEST(Start, NamesTheCheckOfAConfigurationWithAMistake) {
   std::string output;
   const auto status = reported_by_failing({"--set", "camera.width=1"}, output);
@@ -185,7 +185,7 @@ class CheckOfFiles : public testing::Test {
     fs::permissions(file, fs::perms::owner_read | fs::perms::owner_write);
     return file.string();
   }
-  /// What `dtactd --check-config` says of [net]; empty when all is well.
+  /// The errors of `dtactd --check-config` about [net]; empty without any.
   [[nodiscard]] static std::string check(const std::vector<std::string>& settings) {
     std::vector<std::string> command = {DTACTD_PROGRAM, "--check-config"};
     for (const std::string& setting : settings) {
@@ -200,7 +200,7 @@ class CheckOfFiles : public testing::Test {
   TempFolder folder_;
 };
 
-// Otherwise `systemctl reload` would succeed where the daemon keeps what it has.
+// Otherwise `systemctl reload` would succeed although the daemon keeps its old settings.
 TEST_F(CheckOfFiles, FindsBrokenTokens) {
   const std::string tokens = write("tokens", std::string("view ") + kNewToken + "\n");
   EXPECT_EQ(check({"tokens=" + tokens}), "");
@@ -245,7 +245,7 @@ TEST(Credentials, OneThatIsMissingNamesWhereToPutIt) {
                                           output);
   EXPECT_THAT(output, AllOf(HasSubstr("/etc/credstore/dtactd.tokens"),
                             HasSubstr("what else this machine lacks: dtactd --doctor")));
-  // What systemctl status shows of a daemon that cannot start.
+  // The status that systemctl shows of a daemon that cannot start.
   EXPECT_THAT(status.value_or(""),
               AllOf(StartsWith("STATUS=net.tokens = "), EndsWith("dtactd --doctor")));
 }

@@ -14,7 +14,7 @@ namespace {
 namespace fs = std::filesystem;
 using testing::HasSubstr;
 
-/// What `dtactctl` prints.
+/// Output of `dtactctl`.
 std::string ctl(std::vector<std::string> arguments) {
   arguments.insert(arguments.begin(), DTACTCTL_PROGRAM);
   std::string output;

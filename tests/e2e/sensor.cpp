@@ -16,7 +16,7 @@ void run_or_throw(const std::vector<std::string>& command) {
   if (run_program(command, &output) != 0) throw std::runtime_error(command[0] + ":\n" + output);
 }
 
-/// Untouched until frame 120 of the scene, pressed and still from frame 180 on.
+/// No contact until frame 120 of the scene, pressed and still from frame 180 on.
 void calibrate(const fs::path& folder, const fs::path& calibration) {
   const std::string scene = scene_file("calibrate_ball.toml").string();
   const std::string reference = (folder / "reference").string();

@@ -13,7 +13,7 @@
 namespace dtact::e2e {
 
 /// The rectangle of the simulated 800×600 image that the depth map shows: wider than high, so that
-/// an order which is confused shows.
+/// swapped axes show.
 inline constexpr int kCropWidth = 500;
 inline constexpr int kCropHeight = 400;
 inline constexpr int kCropColumn = (800 - kCropWidth) / 2;
@@ -21,9 +21,9 @@ inline constexpr int kCropRow = (600 - kCropHeight) / 2;
 /// The same for dtact-calibrate.
 inline constexpr const char* kCrop = "500,400";
 
-/// A calibration folder of the simulated sensor, made once in a test program the way a user makes
-/// it: images of the scene calibrate_ball.toml and `dtact-calibrate depth`. The simulator's
-/// truth has no part in it.
+/// A calibration folder of the simulated sensor, made once per test program the way a user makes
+/// it: images of the scene calibrate_ball.toml and `dtact-calibrate depth`, without the
+/// simulator's truth.
 const std::filesystem::path& calibration_folder();
 
 std::filesystem::path scene_file(const std::string& name);
@@ -45,8 +45,9 @@ struct Sensor {
   std::unique_ptr<DaemonProcess> daemon;
 };
 
-/// Reads until `done` says so of a frame or event. False when that takes longer than `patience`.
 using client::Item;
+
+/// Reads until `done` returns true for an item. False when that takes longer than `patience`.
 bool read_until(client::Client& client, const std::function<bool(const Item&)>& done,
                 std::chrono::seconds patience = std::chrono::seconds(30));
 

@@ -57,7 +57,7 @@ TEST(Stream, SixHundredFramesOfTheRightDepth) {
   RecordProperty("median_error_inside_ball_um", static_cast<int>(1000 * inside[inside.size() / 2]));
   std::printf(
       "ball of 5 mm, simulated sensor: mean absolute error inside the true contact "
-      "%.4f mm (median of %d frames), worst frame %.4f mm; untouched %.4f mm\n",
+      "%.4f mm (median of %d frames), worst frame %.4f mm; no contact %.4f mm\n",
       inside[inside.size() / 2], pressed, worst, worst_no_contact);
   EXPECT_LE(worst, 0.03);
   EXPECT_LE(worst_no_contact, 0.01);
@@ -143,7 +143,7 @@ TEST(Stream, SendsWhatASubscriptionOfVersion11AsksFor) {
     }
     return ++frames == 240;
   }));
-  // 30 a second, one more for the first, whatever the load.
+  // 30 a second, plus the first, under any load.
   const double seconds = static_cast<double>(depth_ns.back() - depth_ns.front()) / 1e9;
   EXPECT_LE(static_cast<double>(depth_ns.size()), 30 * seconds + 2);
   EXPECT_GT(depth_ns.size(), 60U);

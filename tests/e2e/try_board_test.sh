@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# try_board_test.sh SOURCE DTACTD DTACTCTL: the script that a first user of a board runs makes a report that
-# holds the facts, the findings and a measurement, and neither the home folder nor a serial number; and
+# try_board_test.sh SOURCE DTACTD DTACTCTL: the script for a first user of a board makes a report with
+# the facts, the findings and a measurement, but without the home folder or a serial number; and
 # dtactd accepts every board's configuration.
 set -euo pipefail
 source=$1 dtactd=$2 dtactctl=$3
@@ -10,7 +10,7 @@ HOME=$(mktemp -d)
 export HOME
 trap 'rm -rf "$HOME"' EXIT
 mkdir "$HOME/bin"
-# Stands before the real one and says what a camera's name may hold.
+# Replaces the real one and prints characters that a camera's name may have.
 cat >"$HOME/bin/dtactctl" <<PROGRAM
 #!/bin/sh
 echo "camera v4l2 serial:SN20250917, /dev/v4l/by-id/usb-Maker_SN20250917-video-index0, 800x600"

@@ -1,4 +1,4 @@
-// The daemon under systemd's watchdog: fed as long as its capture thread goes on.
+// The daemon under systemd's watchdog: fed as long as its capture thread runs.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -22,7 +22,7 @@ class Watched {
   explicit Watched(const std::vector<std::string>& settings)
       : daemon_(arguments(settings), {{"WATCHDOG_USEC", "400000"}}) {}
 
-  /// The longest time without a word to the watchdog within `span` from now.
+  /// The longest time without a message to the watchdog within `span` from now.
   [[nodiscard]] std::chrono::milliseconds longest_silence(std::chrono::milliseconds span) const {
     const auto end = Clock::now() + span;
     auto last = Clock::now();
@@ -53,7 +53,7 @@ class Watched {
   DaemonProcess daemon_;
 };
 
-// The null camera's frames are nobody's, and the daemon is well all the same.
+// The null camera's frames have no reader, and the daemon is healthy all the same.
 TEST(Watchdog, IsFedByADaemonWithTheNullCamera) {
   Watched daemon({"camera.backend=null", "ring.backend=null"});
   EXPECT_LT(daemon.longest_silence(3s), 1s);
@@ -63,7 +63,7 @@ TEST(Watchdog, IsFedByADaemonWithTheNullCamera) {
 TEST(Watchdog, IsNotFedWhileTheCameraHangs) {
   const TempFolder folder;
   const auto scene = folder.path() / "hang.toml";
-  // From 2 s after the start on, for 3 s.
+  // From 2 s after the start, for 3 s.
   base::write_file_atomically(scene, "[[fault]]\nkind = 'hang'\nframe = 120\nframes = 180\n");
   Watched daemon({"camera.backend=sim", "camera.sim.scene=" + scene.string()});
   EXPECT_GT(daemon.longest_silence(6s), 2s);

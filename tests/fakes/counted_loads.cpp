@@ -12,16 +12,16 @@ namespace {
 constexpr std::size_t kSize = 65536;
 
 #if defined(__x86_64__)
-constexpr long long kTrapFlag = 0x100;  // of RFLAGS: a trap after the next instruction
+constexpr long long kTrapFlag = 0x100;  // bit of RFLAGS: a trap after the next instruction
 
 std::uint8_t* memory = nullptr;
 volatile std::size_t loads = 0;
 
-// A load has met the unreadable memory: it is let through, with a trap behind it.
+// A load has hit the unreadable memory: it is allowed, with a trap after it.
 void on_fault(int /*signal*/, siginfo_t* info, void* context) {
   auto* at = static_cast<std::uint8_t*>(info->si_addr);
   if (at < memory || at >= memory + kSize) {
-    ::signal(SIGSEGV, SIG_DFL);  // somebody else's: met again on return
+    ::signal(SIGSEGV, SIG_DFL);  // another fault: it repeats on return
     return;
   }
   loads = loads + 1;

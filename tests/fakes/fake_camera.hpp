@@ -16,8 +16,8 @@
 
 namespace dtact::fakes {
 
-/// A camera that looks at the toy sensor, about 400 frames a second. What it sees and what ails it
-/// is set through the handle, from any thread, while it runs.
+/// A camera that looks at the toy sensor, about 400 frames a second. Its scene and its faults are
+/// set through the handle, from any thread, while it runs.
 class FakeCamera final : public hal::Camera, private hal::FrameOwner {
  public:
   enum class Mode : std::uint8_t { streaming, silent, unplugged, ended };
@@ -25,18 +25,17 @@ class FakeCamera final : public hal::Camera, private hal::FrameOwner {
     std::atomic<Mode> mode{Mode::streaming};
     std::atomic<int> lose{0};    ///< Frames to leave out before the next.
     std::atomic<int> damage{0};  ///< Frames to report as damaged.
-    std::atomic<int> lent{0};    ///< Frames out on loan now.
+    std::atomic<int> lent{0};    ///< Frames leased now.
     std::atomic<std::uint64_t> delivered{0};
-    std::function<void(std::uint64_t)> on_grab;  ///< On the capture thread, with delivered so far.
-    hal::CameraInfo info{
-        .backend = "fake",
-        .identity = "fake camera",
-        .pixel_format = "GREY",
-        .width = kToyWidth,
-        .height = kToyHeight,
-        .fps = 25,  // promised: what even an emulator has, so that it is never slow
-        .light_delay_frames = 2,
-        .controls = {}};
+    std::function<void(std::uint64_t)> on_grab;  ///< On the capture thread, with the count.
+    hal::CameraInfo info{.backend = "fake",
+                         .identity = "fake camera",
+                         .pixel_format = "GREY",
+                         .width = kToyWidth,
+                         .height = kToyHeight,
+                         .fps = 25,  // promised: even an emulator reaches it, so it is never slow
+                         .light_delay_frames = 2,
+                         .controls = {}};
     bool refuse_start = false;
 
     void show(const ToyScene& scene) {
@@ -118,7 +117,7 @@ class FakeCamera final : public hal::Camera, private hal::FrameOwner {
  private:
   void give_back(int /*index*/) noexcept override { --handle_.lent; }
 
-  /// Who reads what nobody asked for is to notice.
+  /// Makes reading of unrequested pixels visible.
   void blank_unread() noexcept {
     for (int y = 0; y < kToyHeight; ++y) {
       for (int x = 0; x < kToyWidth; ++x) {

@@ -11,10 +11,10 @@
 
 namespace dtact::fakes {
 
-/// Remembers what it was told to show; fails and is away when told to.
+/// Records the lights that it shows; fails and is away on demand.
 class FakeRing final : public hal::LightRing {
  public:
-  /// What the test keeps hold of while the pipeline owns the ring.
+  /// The test's access while the pipeline owns the ring.
   struct Handle {
     std::atomic<bool> broken{false};
     std::atomic<bool> away{false};

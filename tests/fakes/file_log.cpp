@@ -37,13 +37,13 @@ void FileLog::add(const std::string& what, const std::string& path, const std::s
     return std::regex_replace(relative, kTemporary, ".XXXXXX");
   };
   const std::string from = shown(path);
-  if (from.empty() || from.starts_with("..")) return;  // elsewhere
+  if (from.empty() || from.starts_with("..")) return;  // outside the folder
   calls_.push_back(what + " " + from + (to.empty() ? "" : " to " + shown(to)));
 }
 
 }  // namespace dtact::fakes
 
-// The C library's own functions, in whose place these stand: an executable's symbols come first.
+// The C library's own functions, which these replace: an executable's symbols come first.
 using dtact::fakes::current;
 using dtact::fakes::next;
 using dtact::fakes::path_of;

@@ -6,10 +6,10 @@
 
 namespace dtact::fakes {
 
-/// What this thread asks of the file system below a folder while the object lives, in order, as a
-/// power cut would find it: "write a/b", "sync a/b", "rename a/b to c". Paths are relative to the
-/// folder, which is "."; the six letters by which a temporary file is told from others are
-/// "XXXXXX". The calls themselves are done as ever. One at a time.
+/// This thread's changes to the file system below a folder while the object lives, in order, as a
+/// power cut would find them: "write a/b", "sync a/b", "rename a/b to c". Paths are relative to the
+/// folder, which is "."; the six random letters of a temporary file's name are
+/// "XXXXXX". The calls themselves are made as usual. One object at a time.
 class FileLog {
  public:
   explicit FileLog(const std::filesystem::path& folder);
@@ -19,7 +19,7 @@ class FileLog {
 
   [[nodiscard]] const std::vector<std::string>& calls() const noexcept { return calls_; }
 
-  /// For the wrapped calls alone.
+  /// Called by the wrapped functions only.
   void add(const std::string& what, const std::string& path, const std::string& to = {});
 
  private:

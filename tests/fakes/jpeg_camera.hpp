@@ -16,7 +16,7 @@ namespace dtact::fakes {
 /// A camera that decodes one of its JPEG payloads, in turn, for every frame.
 class JpegCamera final : public hal::Camera, private hal::FrameOwner {
  public:
-  /// `on_grab`: called on the capture thread before each frame, with the number delivered so far.
+  /// Calls `on_grab` on the capture thread before each frame, with the number delivered so far.
   JpegCamera(int width, int height, std::vector<std::vector<std::uint8_t>> payloads,
              std::function<void(std::uint64_t)> on_grab)
       : payloads_(std::move(payloads)),

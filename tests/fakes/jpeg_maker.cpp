@@ -4,7 +4,7 @@
 #include <cstdio>
 #include <cstdlib>
 
-// clang-format off: jpeglib.h leaves it to others to declare FILE and size_t.
+// clang-format off: jpeglib.h uses FILE and size_t without declaring them.
 #include <jpeglib.h>
 // clang-format on
 

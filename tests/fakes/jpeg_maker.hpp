@@ -11,10 +11,10 @@ struct JpegRecipe {
   int width = 64;
   int height = 48;
   int quality = 95;
-  bool colour = true;  ///< YCbCr 4:2:0 with lively chroma; else grey alone.
+  bool colour = true;  ///< YCbCr 4:2:0 with varied chroma; else grey only.
   bool progressive = false;
-  int restart_rows = 0;        ///< Restart marker every so many rows of blocks; 0 = none.
-  bool huffman_tables = true;  ///< false: left out, as UVC cameras do.
+  int restart_rows = 0;        ///< Restart marker every `restart_rows` rows of blocks; 0 = none.
+  bool huffman_tables = true;  ///< false: left out, like UVC cameras do.
 };
 
 /// A JPEG whose luma at column x, row y is luma(x, y) before coding.

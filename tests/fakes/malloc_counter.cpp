@@ -24,7 +24,7 @@ void note() noexcept {
 }  // namespace
 
 #if DTACT_OWN_MALLOC
-// glibc's own, under the names it keeps for those who replace malloc.
+// glibc's own functions, under the names that it offers to replacements of malloc.
 // NOLINTBEGIN(bugprone-reserved-identifier)
 extern "C" {
 void* __libc_malloc(std::size_t);

@@ -4,10 +4,10 @@
 
 namespace dtact::fakes {
 
-/// Counts calls of malloc and its family, free among them, hence of operator new and delete too, on
-/// threads that asked for it.
-/// A program that links malloc_counter.cpp takes part as a whole; sanitizers bring their own
-/// malloc, so there nothing can be counted.
+/// Counts calls of malloc and its family, including free, and so of operator new and delete, on
+/// threads that switch it on.
+/// It needs malloc_counter.cpp in the program; sanitizers bring their own
+/// malloc, so nothing can be counted there.
 [[nodiscard]] bool can_count_allocations() noexcept;
 
 /// Counting of the calling thread's allocations and frees, on or off. Starts off.

@@ -19,7 +19,7 @@
 
 namespace dtact::fakes {
 
-/// The service manager's end of sd_notify(3): what $NOTIFY_SOCKET names, a file or, behind an @, an
+/// The service manager's end of sd_notify(3). $NOTIFY_SOCKET names it: a file or, after an @, an
 /// abstract name.
 class NotifySocket {
  public:
@@ -40,7 +40,7 @@ class NotifySocket {
   ~NotifySocket() { ::unlink(path_.c_str()); }
 
   [[nodiscard]] const std::filesystem::path& path() const { return path_; }
-  /// The next message; none when it does not come in time.
+  /// The next message; nothing when it does not come in time.
   [[nodiscard]] std::optional<std::string> next(std::chrono::milliseconds timeout) const {
     pollfd waiting{receiver_.get(), POLLIN, 0};
     if (::poll(&waiting, 1, static_cast<int>(timeout.count())) <= 0) return std::nullopt;

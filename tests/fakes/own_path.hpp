@@ -9,8 +9,8 @@
 
 namespace dtact::fakes {
 
-/// A path in the temporary folder that no other test has, nor the same test of a build beside this
-/// one. Call it in a test.
+/// A path in the temporary folder that is unique to the running test and to this build.
+/// Call it in a test.
 inline std::filesystem::path own_path(std::string_view ending = "") {
   const auto* test = ::testing::UnitTest::GetInstance()->current_test_info();
   return std::filesystem::path(::testing::TempDir()) /

@@ -7,8 +7,8 @@
 
 namespace dtact::fakes {
 
-/// The toy sensor with a gel that scatters, and lists that say the same of sharpened levels and
-/// are uncertain by `sharpened_um`.
+/// The toy sensor with a gel that scatters. Its LUTs are the same for sharpened levels, with an
+/// uncertainty of `sharpened_um`.
 inline std::shared_ptr<calibration::Calibration> scattering_toy_calibration(double sharpened_um) {
   auto calibration = toy_calibration();
   recon::Model model = *calibration->model;

@@ -15,11 +15,11 @@
 #include "tests/fakes/fake_ring.hpp"
 #include "tests/fakes/toy_sensor.hpp"
 
-// begin() makes what the optionals hold.
+// begin() sets the optionals.
 // NOLINTBEGIN(bugprone-unchecked-optional-access,clang-analyzer-optin.performance.Padding)
 namespace dtact::fakes {
 
-/// The capture loop before the toy sensor, one frame at a time on the test's own thread and clock.
+/// The capture loop on the toy sensor, one frame at a time on the test's own thread and clock.
 class SteppedLoop {
  public:
   explicit SteppedLoop(double fps = 60) : camera(*this, fps) {
@@ -28,7 +28,7 @@ class SteppedLoop {
     exchange.want_depth = true;
   }
 
-  /// After this the configuration is the loop's.
+  /// Call it once the configuration is set.
   void begin(const std::shared_ptr<const calibration::Calibration>& calibration,
              bool unusable = false) {
     light.emplace(std::make_unique<FakeRing>(ring), config.light, clock, exchange);
@@ -42,7 +42,7 @@ class SteppedLoop {
       const std::shared_ptr<const calibration::Calibration>& calibration) {
     return pipeline::activate(calibration, camera.info(), config.reconstruction);
   }
-  /// For the next turn; false: the queue is full.
+  /// Submits a command for the next turn; false: the queue is full.
   [[nodiscard]] bool submit(decltype(pipeline::Command::what) what) {
     return exchange.commands.push(pipeline::Command{std::move(what)});
   }
@@ -53,7 +53,7 @@ class SteppedLoop {
 
   /// One turn of the loop; true if it published a frame.
   bool step() {
-    loop->tracker().settle();  // what it finds would else come a frame sooner or later
+    loop->tracker().settle();  // otherwise its result may come a frame sooner or later
     loop->step();
     pipeline::Event event;
     while (exchange.events.pop(event)) events.push_back(event);
@@ -122,12 +122,12 @@ class SteppedLoop {
     hal::CameraInfo description;
     hal::GrabStatus status = hal::GrabStatus::ok;
     ToyScene scene;
-    std::uint32_t flags = hal::kFrameNormal;  ///< Of the next frame.
+    std::uint32_t flags = hal::kFrameNormal;  ///< Flags of the next frame.
     hal::TimestampMeaning meaning = hal::TimestampMeaning::start_of_exposure;
-    double slower = 1;          ///< Times the period that its mode promises.
+    double slower = 1;          ///< Factor on the period that its mode promises.
     std::int64_t delay_ns = 0;  ///< From a frame's timestamp to its arrival.
     std::uint64_t sequence = 0;
-    std::vector<std::uint8_t> jpeg;  ///< Lent with every frame, whatever it shows.
+    std::vector<std::uint8_t> jpeg;  ///< Payload of every frame, independent of the scene.
     std::vector<std::uint8_t> pixels =
         std::vector<std::uint8_t>(std::size_t{kToyWidth} * kToyHeight + hal::kLumaPadding);
   };
@@ -139,7 +139,7 @@ class SteppedLoop {
   pipeline::Exchange exchange{prototype()};
   std::optional<pipeline::LightDriver> light;
   std::optional<pipeline::CaptureLoop> loop;
-  const pipeline::DepthFrame* frame = nullptr;  ///< The newest.
+  const pipeline::DepthFrame* frame = nullptr;  ///< The newest frame.
   std::vector<pipeline::Event> events;
 
  private:

@@ -13,16 +13,16 @@
 
 namespace dtact::fakes {
 
-/// A sensor simple enough to know by heart: 160×120 pixels of 0.2 mm, 31.25 grey levels a
+/// A simple sensor for computing by hand: 160×120 pixels of 0.2 mm, 31.25 grey levels a
 /// millimetre (2 levels in 64 µm), a press that is a dark spot with a bright ring around it.
 struct ToyScene {
-  double light = 1;     ///< Times the calibration's light.
+  double light = 1;     ///< Factor on the calibration's light.
   double tilt = 0;      ///< Light from the right: 1 + tilt at the right edge, 1 − tilt at the left.
   double press_mm = 0;  ///< Indentation in the middle of the press.
-  double x_px = 80;     ///< Its place.
+  double x_px = 80;     ///< Its position.
   double y_px = 60;
   double marks = 0;    ///< Height of the gel's marks, grey levels.
-  int marks_px = 0;    ///< How far to the right they lie of where they were at calibration.
+  int marks_px = 0;    ///< Their shift to the right since calibration.
   double covered = 0;  ///< Share of its light that the left quarter loses.
 };
 
@@ -91,8 +91,8 @@ inline std::vector<std::uint16_t> toy_reference_q8(const ToyScene& scene = {}) {
   return q8;
 }
 
-/// Its calibration, made under full white light: the whole frame but eight pixels on each side, or
-/// the left `width` pixels of that.
+/// The toy's calibration, made under full white light: the whole frame but eight pixels on each
+/// side, or the left `width` pixels of that.
 inline std::shared_ptr<calibration::Calibration> toy_calibration(const ToyScene& undeformed = {},
                                                                  int width = kToyWidth - 16) {
   auto model = std::make_shared<recon::Model>();

@@ -1,4 +1,4 @@
-// What a daemon may send, read by the client library: pixels, or a ProtocolError.
+// Messages that a daemon may send, read by the client library: pixels, or a ProtocolError.
 #include <string>
 
 #include "clients/cpp/errors.hpp"
@@ -15,7 +15,7 @@ void read(const v1::DepthMap& map) {
   const auto pixels = std::size_t{map.width()} * map.height();
   require(values.size() == pixels && client::millimetres_of(map).size() == pixels,
           "a depth map has as many values as pixels");
-  // What was decoded can be encoded, and comes back.
+  // A decoded map can be encoded, and comes back.
   wire::DepthEncoder encoder;
   std::string bytes;
   encoder.encode(map.encoding(), values, map.width(), bytes);

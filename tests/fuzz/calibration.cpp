@@ -1,5 +1,5 @@
 // A calibration's two files, calibration.toml and, after a line "#PNG", reference.png. "@SHA@"
-// stands for the digest of the PNG. What is accepted can be written again and reconstructs a frame.
+// stands for the digest of the PNG. An accepted one can be written again and reconstructs a frame.
 #include "daemon/calibration/calibration.hpp"
 
 #include <fmt/format.h>
@@ -45,7 +45,7 @@ void use(const calibration::Calibration& calibration) {
   const calibration::Files rewritten = again(written);
   require(rewritten.toml == written.toml && rewritten.reference_png == written.reference_png,
           "a calibration that is read can be written and stays the same");
-  // Larger maps say nothing new and take long.
+  // Larger maps add nothing and take long.
   if (calibration.model->reference_q8.size() > 65536) return;
   reconstruct(calibration.model);
   if (calibration.model->rectify.width < 4 || calibration.model->rectify.height < 4) return;

@@ -1,5 +1,5 @@
-// A configuration file and, each after a zero byte, values of --set. What is accepted can be
-// printed, and what was printed means the same.
+// A configuration file and, each after a zero byte, values of --set. An accepted configuration can
+// be printed, and the printed one means the same.
 #include "daemon/app/config.hpp"
 
 #include <sstream>
@@ -10,7 +10,7 @@
 namespace dtact::fuzz {
 namespace {
 
-/// The effective values without where they came from.
+/// The effective values without their origins.
 std::vector<std::string> values_of(const app::LoadedConfig& loaded) {
   std::ostringstream out;
   app::print_config(loaded, out);

@@ -1,6 +1,6 @@
 // The depth encodings as a daemon may send them: two bytes each of width and height, one of
-// the encoding, then what is decoded. What decodes has as many values as pixels, and every encoding
-// of it decodes to the same.
+// the encoding, then the encoded bytes. A decoded map has as many values as pixels, and every
+// encoding of it decodes to the same.
 #include <string>
 #include <string_view>
 #include <vector>
@@ -12,7 +12,7 @@ namespace dtact::fuzz {
 namespace {
 
 constexpr std::size_t kHead = 5;
-/// Larger maps are decoded and no more, so that an input takes milliseconds.
+/// Larger maps are only decoded, so that an input takes milliseconds.
 constexpr std::size_t kMaxPixels = 100'000;
 
 void encode_again(v1::DepthEncoding sent, std::string_view bytes,
@@ -24,7 +24,7 @@ void encode_again(v1::DepthEncoding sent, std::string_view bytes,
     std::vector<std::int16_t> back;
     require(wire::decode_depth(encoding, again, width, map.size() / width, back) && back == map,
             "every encoding of a map decodes to it");
-    // zstd may say the same in many ways.
+    // zstd has several encodings of the same content.
     require(encoding != v1::DEPTH_INT16 || encoding != sent || again == bytes,
             "a map has one int16 form");
   }

@@ -1,5 +1,5 @@
-// Arbitrary maps: a byte of the width less one, then int16 values. Every encoding gives the map
-// back.
+// Arbitrary maps: a byte of the width less one, then int16 values. Every encoding decodes to the
+// same map.
 #include <cstring>
 #include <string>
 #include <vector>

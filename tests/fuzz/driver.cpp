@@ -1,9 +1,9 @@
 // Runs a fuzz target without libFuzzer: the files of its corpus, then mutations of them, always the
-// same ones. So a compiler without libFuzzer tries it too, as a test of a second.
+// same ones. So a compiler without libFuzzer runs it too, as a test of a second.
 //
 //   fuzz_TARGET CORPUS_FOLDER_OR_FILE [MUTATIONS]
 //
-// The input that is being tried lies in fuzz_TARGET.input in the working directory; it is left
+// The input under test is in fuzz_TARGET.input in the working directory; it stays
 // there when the target ends the program, and can be given as the file.
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -28,7 +28,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t kLongest = 65536;  // bytes of a mutated input
-/// No input of that length may ask for more.
+/// An input of that length may not need more.
 constexpr rlim_t kMaxMemory = rlim_t{2} << 30U;
 
 std::vector<std::string> read_corpus(const fs::path& path) {
@@ -55,7 +55,7 @@ class Mutator {
   }
 
  private:
-  // Of this engine, unlike of the library's distributions, every platform gives the same numbers.
+  // This engine gives the same numbers on every platform, unlike the library's distributions.
   std::size_t below(std::size_t limit) { return static_cast<std::size_t>(random_() % limit); }
   template <typename Lut>
   const typename Lut::value_type& pick(const Lut& lut) {
@@ -96,7 +96,7 @@ class Mutator {
     }
   }
 
-  /// A piece of another seed over the input from `at` on.
+  /// Copies a piece of another seed over the input from `at` on.
   void splice(std::string& input, std::size_t at) {
     const std::string& other = pick(corpus_);
     const std::size_t from = below(other.size() + 1);
@@ -104,7 +104,7 @@ class Mutator {
     input.replace(at, std::min(piece.size(), input.size() - at), piece);
   }
 
-  /// One, two or four bytes by a value at the edge of something, in either order.
+  /// Replaces one, two or four bytes by a value at a limit, in either byte order.
   void replace_integer(std::string& input, std::size_t at) {
     static constexpr std::array<std::uint32_t, 10> kEdges = {
         0, 1, 0x7F, 0x80, 0xFF, 0x7FFF, 0x8000, 0xFFFF, 0x7FFFFFFF, 0xFFFFFFFF};
@@ -118,7 +118,7 @@ class Mutator {
     }
   }
 
-  /// The decimal number at or after `at` by another one.
+  /// Replaces the decimal number at or after `at`.
   void replace_number(std::string& input, std::size_t at) {
     static constexpr std::array<const char*, 14> kNumbers = {"0",
                                                              "-1",

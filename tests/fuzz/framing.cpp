@@ -1,4 +1,4 @@
-// A byte stream taken apart into messages: as a whole and in pieces it gives the same ones.
+// A byte stream split into messages: as a whole and in pieces it gives the same ones.
 #include "proto/framing.hpp"
 
 #include <algorithm>

@@ -17,9 +17,9 @@
 
 #include "hal/base/unique_fd.hpp"
 
-// What the fuzz targets share. A target is a function of bytes (libFuzzer's interface) that ends
-// the program when what it tries breaks a promise; exceptions that its header does not name do the
-// same.
+// Common parts of the fuzz targets. A target is a function of bytes (libFuzzer's interface) that
+// ends the program when the tested code breaks a promise; exceptions that its header does not name
+// do the same.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size);
 
 namespace dtact::fuzz {
@@ -47,7 +47,7 @@ inline void require_sentence(std::string_view text) {
   }
 }
 
-/// `text` at each `separator`, at most `most` parts; the last one holds the rest.
+/// Splits `text` at each `separator` into at most `most` parts; the last one holds the rest.
 inline std::vector<std::string> split(std::string_view text, std::string_view separator,
                                       std::size_t most) {
   std::vector<std::string> parts;
@@ -61,7 +61,7 @@ inline std::vector<std::string> split(std::string_view text, std::string_view se
   return parts;
 }
 
-/// A file in memory that has a path, for what reads files.
+/// A file in memory with a path, for code that reads files.
 class MemoryFile {
  public:
   explicit MemoryFile(std::string_view content) : fd_(::memfd_create("fuzz", MFD_CLOEXEC)) {

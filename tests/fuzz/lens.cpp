@@ -1,4 +1,4 @@
-// A lens file. What is accepted can be written again and makes a table that stays in the frame.
+// A lens file. An accepted one can be written again and makes a table that stays in the frame.
 #include <algorithm>
 #include <stdexcept>
 

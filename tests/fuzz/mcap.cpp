@@ -1,4 +1,4 @@
-// An MCAP file: opened and read to its end. Only mcap::Error may come out of it.
+// An MCAP file, read to its end. Only mcap::Error may be thrown.
 #include "hal/files/mcap_reader.hpp"
 #include "tests/fuzz/fuzz.hpp"
 

@@ -1,5 +1,5 @@
-// An object's file: STL or PLY. What is accepted has faces whose corners are there, or a normal for
-// each point, and can be sampled or is refused with a sentence.
+// An object's file: STL or PLY. An accepted one has faces with existing corners, or a normal for
+// each point, and can be sampled or is refused with a message.
 #include <stdexcept>
 
 #include "clients/perceive/pose/object_model.hpp"

@@ -1,5 +1,5 @@
-// A camera's JPEG payload, four bytes of crop before it. A bad frame leaves nothing behind in the
-// decoder, and a crop gives the pixels that the whole picture has there.
+// A camera's JPEG payload, four bytes of crop before it. A bad frame leaves no state in the
+// decoder, and a crop gives the same pixels as the whole picture.
 #include <algorithm>
 #include <array>
 

@@ -1,5 +1,5 @@
 // A recording: timestamps.csv, then its frames, with a line "--" between each; or an MCAP file.
-// What is accepted plays to its end.
+// An accepted recording plays to its end.
 #include <unistd.h>
 
 #include <chrono>
@@ -19,7 +19,7 @@ namespace fs = std::filesystem;
 
 constexpr std::size_t kMaxFrames = 4;
 
-/// The folder that every input is laid out in.
+/// The folder for every input's files.
 class Folder {
  public:
   Folder() {
@@ -34,7 +34,7 @@ class Folder {
     fs::remove_all(path_, ignored);
   }
 
-  /// Returns what camera.replay.folder is to be.
+  /// Returns the value for camera.replay.folder.
   [[nodiscard]] fs::path lay_out(std::string_view input) const {
     for (const auto& entry : fs::directory_iterator(path_)) fs::remove(entry);
     if (input.starts_with(mcap::kMagic)) {
@@ -66,13 +66,13 @@ void play(const hal::CameraConfig& config) {
   hal::replay::ReplayCamera camera(config, clock);
   const hal::CameraInfo info = camera.info();
   require(info.width > 0 && info.height > 0 && info.fps > 0, "a recording has a size and a rate");
-  // Larger ones say nothing new and take long.
+  // Larger ones add nothing and take long.
   if (info.width > 1024 || info.height > 1024) return;
   camera.start();
   std::size_t grabs = 0;
   for (hal::Frame frame;;) {
     const auto status = camera.grab(frame, std::chrono::hours(24 * 365));
-    // A gap of more than a year is waited for in vain.
+    // A gap of more than a year is not waited for.
     if (status == hal::GrabStatus::ended || status == hal::GrabStatus::timeout) break;
     // A message of an MCAP file has 31 bytes at least.
     require(++grabs <= 65536 / 31, "a recording ends");

@@ -1,6 +1,6 @@
-// What a client may send: whatever it is, each answer is a message, and the next client is served.
-// The first byte says whether the rest comes as it is, or as messages behind a Hello, each after
-// its length (two bytes, little-endian) in the input.
+// Bytes that a client may send: each answer is a message, and the next client is served.
+// The first byte selects whether the rest is sent unchanged, or as messages after a Hello, each
+// after its length (two bytes, little-endian) in the input.
 #include <algorithm>
 
 #include "tests/fuzz/fuzz.hpp"

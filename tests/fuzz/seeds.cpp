@@ -36,7 +36,7 @@ std::string framed(const std::string& body) {
   return std::string(reinterpret_cast<const char*>(length.data()), length.size()) + body;
 }
 
-/// As requests.cpp takes them apart.
+/// Splits like requests.cpp.
 std::string counted(const std::string& body) {
   return std::string{static_cast<char>(body.size() % 256), static_cast<char>(body.size() / 256)} +
          body;
@@ -179,8 +179,8 @@ void add_answers(const Corpus& corpus) {
   corpus.add("answers", "event_contact", message.SerializeAsString());
 }
 
-/// A map of a pressed slope with untouched and untrusted parts, as depth_maps.cpp and, in each
-/// encoding, as depth_decoders.cpp takes it.
+/// A map of a pressed slope with contact-free and untrusted parts, for depth_maps.cpp and, in each
+/// encoding, for depth_decoders.cpp.
 void add_depth(const Corpus& corpus, const std::string& name, std::size_t width,
                std::size_t height) {
   std::vector<std::int16_t> map;

@@ -1,5 +1,5 @@
-// A token file: what is accepted grants the rights that its own lines name and nothing else, what
-// is not is refused with a sentence that tells no token.
+// A token file: an accepted one grants the rights that its own lines name and nothing else; a
+// refused one gets a message that reveals no token.
 #include "daemon/serve/tokens.hpp"
 
 #include <sstream>

@@ -1,6 +1,6 @@
-// What dtact-web reads of daemons and of Foxglove's clients: a frame that is relayed is the frame
-// that was sent, what Foxglove is shown of it is made or refused, and no text or bytes of a
-// client's break anything.
+// dtact-web's input from daemons and from Foxglove's clients: a relayed frame equals the frame
+// that was sent, Foxglove's view of it is made or refused, and no text or bytes of a
+// client break anything.
 #include <stdexcept>
 
 #include "clients/cpp/errors.hpp"

@@ -1,9 +1,9 @@
 # shellcheck shell=bash disable=SC2154
 # Sourced by root.sh after chroot.sh, for a Debian of another architecture; the variables are root.sh's.
-# Nothing of that Debian runs here, so this machine's kernel need not know how to: its maintainer scripts
+# Nothing of that Debian runs on this machine's kernel: its maintainer scripts
 # run in the emulated machine of qemu.sh, on Debian's own kernel.
 
-# foreign_apt TOOL ARGUMENT...: apt for that Debian as if nothing of it were installed, in $root.apt.
+# foreign_apt TOOL ARGUMENT...: apt for that Debian without installed packages, in $root.apt.
 foreign_apt() {
   local tool=$1
   shift
@@ -13,7 +13,7 @@ foreign_apt() {
     -o Dir::Cache="$root.apt" "$@"
 }
 
-# download WANTED: what satisfies that, with all it depends on, into $root.apt/archives, and a kernel and
+# download WANTED: downloads packages that satisfy it, with all dependencies, into $root.apt/archives, and a kernel and
 # busybox into $root.apt/boot.
 download() {
   rm -rf "$root.apt"
@@ -59,7 +59,7 @@ make_boot_files() {
 in_emulation() {
   rm -rf "$root.emulated/rc"
   echo "$2" > "$root.emulated/run"
-  # It ends with this script, however that ends.
+  # It ends with this script, in every case.
   setpriv --pdeathsig TERM timeout 7200 "$here/qemu.sh" "$root.emulated" "$1" raw "$root.emulated" setup=1 \
     > "$root.emulated/console" < /dev/null || true
   [ "$(cat "$root.emulated/rc" 2> /dev/null)" = 0 ] || { tail -n 20 "$root.emulated"/{console,log}; return 1; }
@@ -90,7 +90,7 @@ prepare_emulated() {
   mkdir "$root/job"
   mv "$root.apt/archives" "$root/more"
   logged mke2fs -q -t ext4 -d "$root" "$root.emulated/disc" 4G
-  # At last few and large writes, for each waits until this machine has done it.
+  # Few and large writes at the end, because each waits until this machine has done it.
   logged in_emulation "$root.emulated/disc" 'set -e
     /debootstrap/debootstrap --second-stage
     apt-get install -y --no-install-recommends /more/*.deb

@@ -12,11 +12,11 @@ KERNEL = Path(os.environ.get('KERNEL_CACHE', Path.home() / '.cache/dtactd-kernel
 
 
 class GuestError(Exception):
-    """What a guest did not do; the message holds its last words."""
+    """A failure of the guest; the message has its last output."""
 
 
 class Guest:
-    """A running guest, on User Mode Linux. It ends with the block that holds it, at the latest.
+    """A running guest on User Mode Linux. It ends at the latest with its `with` block.
 
     disc: an ext4 image. What the guest writes goes into the file `changes` (copy on write), made where it
     is not there yet.
@@ -29,7 +29,7 @@ class Guest:
         for name in ('rc', 'log', 'journal'):
             (job / name).unlink(missing_ok=True)
         console = open(job / 'console', 'wb')
-        # It ends with this process, however that ends: the namespace's first process takes all with it.
+        # It ends with this process in every case: the namespace's first process takes all with it.
         tied = ['setpriv', '--pdeathsig', 'KILL', 'unshare', '--pid', '--fork', '--kill-child=KILL']
         self._process = subprocess.Popen(
             [*tied, *self._command(disc, changes, check_disc)],
@@ -37,8 +37,8 @@ class Guest:
         console.close()
 
     def _command(self, disc: Path, changes: Path, check_disc: bool) -> list[str | Path]:
-        # Every write reaches the host's file when the guest is told so: a kill is a power cut of a
-        # disc without a cache that forgets.
+        # Every write reaches the host's file before the guest sees it done: a kill is a power cut of a
+        # disc without a volatile cache.
         return [KERNEL / 'linux', 'mem=768M', f'ubd0={changes},{disc}', 'root=/dev/ubda',
                 *(('ro', 'fsck.mode=force') if check_disc else ('rw',)), 'init=/sbin/init',
                 f'hostfs={self.job}', f'uml_dir={self.job}/uml/', 'ssl=null', 'con=null', 'con0=fd:0,fd:1', 'quiet',
@@ -51,7 +51,7 @@ class Guest:
         self.cut()
 
     def cut(self):
-        """The power goes, now. The guest's kernel and its processes are processes of one group here."""
+        """Cuts the power. The guest's kernel and its processes are one process group on the host."""
         try:
             os.killpg(self._process.pid, signal.SIGKILL)
         except ProcessLookupError:
@@ -59,7 +59,7 @@ class Guest:
         self._process.wait()
 
     def wait_for_file(self, name: str, limit_s: float):
-        """Returns once /job/name is there, which the guest's commands make."""
+        """Returns once the guest's commands have made /job/name."""
         end = time.monotonic() + limit_s
         while not (self.job / name).exists():
             if self._process.poll() is not None:
@@ -69,7 +69,7 @@ class Guest:
             time.sleep(0.02)
 
     def finish(self, limit_s: float, off: bool) -> int:
-        """The exit code of /job/run. With `off` the guest powers off by itself and its disc is in order."""
+        """The exit code of /job/run. With `off` the guest shuts down and its disc is clean."""
         self.wait_for_file('rc', limit_s)
         if off:
             try:

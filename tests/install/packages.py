@@ -6,12 +6,12 @@ from pathlib import Path
 
 
 def installable(folder: Path) -> list[Path]:
-    """The packages in a folder that one installs: not those of debugging symbols."""
+    """The packages in a folder to install: without debugging symbols."""
     return sorted(deb for deb in folder.glob('*.deb') if '-dbgsym_' not in deb.name)
 
 
 def make_newer(debs: Path, out: Path):
-    """Copies of the packages whose version ends in .newer and whose conffile says another thing."""
+    """Copies of the packages whose version ends in .newer and whose conffile differs."""
     out.mkdir()
     for deb in installable(debs):
         with tempfile.TemporaryDirectory() as folder:
@@ -20,7 +20,7 @@ def make_newer(debs: Path, out: Path):
             version = subprocess.run(['dpkg-deb', '-f', deb, 'Version'], check=True, capture_output=True,
                                      text=True).stdout.strip()
             control = tree / 'DEBIAN' / 'control'
-            # The version itself, and where one package wants the same of another.
+            # The version itself, and where one package depends on the same version of another.
             control.write_text(control.read_text().replace(version, f'{version}.newer'))
             configuration = tree / 'etc' / 'dtactd' / 'dtactd.toml'
             if configuration.exists():

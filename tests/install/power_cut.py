@@ -8,11 +8,11 @@ from pathlib import Path
 from guest import Guest, GuestError
 
 HERE = Path(__file__).resolve().parent
-BOOT_S = 600  # A guest on a busy machine takes its time.
+BOOT_S = 600  # A guest on a busy machine is slow.
 
 
 def run_once(disc: Path, changes: Path, job: Path, script: str, arguments: str = '') -> str:
-    """Boots, runs guest/`script` and powers off; what it printed."""
+    """Boots, runs guest/`script` and powers off; returns its output."""
     _prepare(job, script, arguments)
     with Guest(disc, job, changes, check_disc=True) as guest:
         if guest.finish(BOOT_S, off=True) != 0:
@@ -21,7 +21,7 @@ def run_once(disc: Path, changes: Path, job: Path, script: str, arguments: str =
 
 
 def cut_uploads(disc: Path, installed: Path, job: Path, moments: random.Random, cuts: int):
-    """Whatever moment the power goes at, the next boot has the old or the new calibration, whole."""
+    """After a power cut at any moment the next boot has the old or the new calibration, complete."""
     _install(disc, installed, job)
     changes = installed.with_name('uploads.cow')
     shutil.copyfile(installed, changes)
@@ -39,7 +39,7 @@ def cut_uploads(disc: Path, installed: Path, job: Path, moments: random.Random, 
 
 
 def cut_upgrades(disc: Path, installed: Path, job: Path, moments: random.Random, cuts: int):
-    """Whatever moment the power goes at, the daemon is back, and dpkg finishes the upgrade. The moments are
+    """After a power cut at any moment the daemon runs again, and dpkg finishes the upgrade. The moments are
     steps of dpkg's, so that they lie in the upgrade however long it takes."""
     _install(disc, installed, job)
     changes = installed.with_name('upgrade.cow')

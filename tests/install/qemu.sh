@@ -4,7 +4,7 @@
 # software. The guest sees the folder JOB as /job, the kernel the further parameters; the console is
 # standard output. Ends when the guest powers off.
 #
-# A write is on this machine's disc some time after the guest believes it: for guests that are thrown away.
+# A write reaches this machine's disc some time after the guest believes it: only for guests that are thrown away.
 set -euo pipefail
 folder=$1 disc=$2 format=$3 job=$4
 shift 4

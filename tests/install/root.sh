@@ -5,7 +5,7 @@
 # ~/.cache/dtactd-chroots); the image is made again only where something in it changed. For arm64 the
 # kernel is Debian's, beside the image as vmlinuz and initrd.
 #
-# Exit code: 0 the image is there; 77 it cannot be had here (the reason is printed); else failed.
+# Exit code: 0 the image is there; 77 it cannot be made here (the reason is printed); else failed.
 set -euo pipefail
 suite=$1 architecture=$2 packages=$3 image=$4
 here=$(cd "$(dirname "$0")" && pwd)
@@ -20,7 +20,7 @@ disc=/dev/ubda
 compgen -G "$packages/*.deb" > /dev/null || skip "no packages in $packages"
 packages=$(cd "$packages" && pwd)
 
-# What the packages want from Debian: their dependencies, but not on each other.
+# Debian packages that the given packages depend on, without each other.
 wanted() {
   local package field
   for package in "$packages"/*.deb; do
@@ -31,7 +31,7 @@ ours() {
   local package
   for package in "$packages"/*.deb; do dpkg-deb -f "$package" Package; done | paste -sd'|'
 }
-# In `COMMAND || …` bash would go on after what fails inside a function.
+# In `COMMAND || …` bash would continue after a failure inside a function.
 logged() {
   local status
   set +e
@@ -42,7 +42,7 @@ logged() {
 }
 
 # Packages of the guest itself: an init, a bus for systemctl, device nodes and their groups, the tools of
-# the tests. As in every installed Debian, nothing starts by itself that the test does not ask for.
+# the tests. As in every installed Debian, nothing starts that the test does not start.
 guest_packages=(systemd systemd-sysv dbus udev kmod iproute2 procps)
 depends=$(wanted)
 if [ "$architecture" = amd64 ]; then
@@ -69,7 +69,7 @@ echo guest > "$root/etc/hostname"
 printf '127.0.0.1 localhost guest\n::1 localhost\n' > "$root/etc/hosts"
 echo "$disc / ext4 errors=remount-ro 0 1" > "$root/etc/fstab"
 logged systemctl --root="$root" enable -q dtact-test.service
-# What a guest of a minute has no use for costs it half of its boot.
+# Units that a guest of a minute does not need cost it half of its boot.
 logged systemctl --root="$root" mask -q getty.target remote-fs.target timers.target \
   modprobe@{configfs,dm_mod,drm,efi_pstore,fuse,loop}.service systemd-modules-load.service \
   sys-kernel-{config,debug,tracing}.mount sys-fs-fuse-connections.mount \
@@ -78,8 +78,8 @@ mkdir -p "$root"/etc/systemd/{journald,system}.conf.d
 printf '[Journal]\nStorage=volatile\n' > "$root/etc/systemd/journald.conf.d/test.conf"
 # A guest under load is slow, which is no fault of the service.
 printf '[Manager]\nDefaultTimeoutStartSec=600s\n' > "$root/etc/systemd/system.conf.d/test.conf"
-# So is the unit. And to a real-time thread of the guest the time counts that others had the processor
-# of the machine below.
+# So is the unit's. Time in which other programs had the host's processor counts as run time of the
+# guest's real-time thread.
 for unit in dtactd dtactd@; do
   mkdir -p "$root/etc/systemd/system/$unit.service.d"
   printf '[Service]\nTimeoutStartSec=600s\nLimitRTTIME=infinity\n' > "$root/etc/systemd/system/$unit.service.d/test.conf"

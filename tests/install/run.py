@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Installs the Debian packages in a guest that boots Debian with systemd, and tries the service there.
+"""Installs the Debian packages in a guest that boots Debian with systemd, and tests the service there.
 
 The cases, scripts in cases/, run one after another in one guest, as root; the first is install. The
 power cuts (--cuts) end guests of their own at random moments. For arm64 (--architecture) the guest is an
@@ -25,12 +25,12 @@ HERE = Path(__file__).resolve().parent
 SHORT = ('install', 'purge')
 ALL = ('install', 'restart', 'hung_camera', 'broken_configuration', 'reload', 'state_disc', 'clock',
        'two_sensors', 'outside', 'credentials', 'devices', 'upgrade', 'purge')
-# What is another program or another kernel on another processor; the rest would say the same again.
+# Cases that differ on another processor's programs or kernel; the others would only repeat.
 EMULATED = ('install', 'restart', 'broken_configuration', 'reload', 'purge')
 
 
 def job_folder(folder: Path, debs: Path, emulated: bool) -> Path:
-    """The folder that the guest sees as /job, with all that a case needs but calibrations."""
+    """The folder that the guest sees as /job, with everything that a case needs except calibrations."""
     for name in ('packages', 'newer', 'modules'):
         shutil.rmtree(folder / name, ignore_errors=True)
     (folder / 'packages').mkdir(parents=True)
@@ -45,7 +45,7 @@ def job_folder(folder: Path, debs: Path, emulated: bool) -> Path:
 
 
 def run_cases(disc: Path, folder: Path, job: Path, names: list[str], emulated: bool) -> bool:
-    """True when all passed. A case that fails does not keep the others from running."""
+    """True when all passed. The others run after a failed case, too."""
     lines = ['echo "booted in $(cut -d " " -f 1 /proc/uptime) s: $(uname -srm)"',
              f'export emulated={"1" if emulated else ""}', 'failed=0']
     for name in names:
@@ -85,7 +85,7 @@ def main() -> int:
                         'what the platform tests have built for arm64)')
     parser.add_argument('--all', action='store_true', help='every case that makes sense for the '
                         'architecture, instead of installing and purging')
-    parser.add_argument('--cuts', type=int, default=0, help='so many power cuts of an upload, and of an upgrade')
+    parser.add_argument('--cuts', type=int, default=0, help='number of power cuts of an upload, and of an upgrade')
     parser.add_argument('--seed', type=int, default=14, help='of the moments of the power cuts')
     parser.add_argument('case', nargs='*', help='these cases alone, after install')
     arguments = parser.parse_args()

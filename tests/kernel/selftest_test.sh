@@ -1,5 +1,5 @@
 #!/bin/bash
-# The self-test's sentence, with programs that stand in for the guest kernel.
+# The self-test's error messages, with programs in place of the guest kernel.
 set -u
 here=$(cd "$(dirname "$0")" && pwd)
 KERNEL_CACHE=$(mktemp -d)

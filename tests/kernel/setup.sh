@@ -2,12 +2,12 @@
 # setup.sh: makes the guest kernel of the kernel tests, once, in a cache folder.
 #
 # The kernel is User Mode Linux (a Linux kernel that runs as an ordinary program) built from
-# Debian's linux-source-6.1 with uml.config: 2 to 7 minutes on 2 cores. What modules are built with
-# is kept beside it, so that a change in modules/ builds those alone, in seconds. Nothing is
-# installed but build tools, and those only by root. Every time, the kernel is booted once to see that
+# Debian's linux-source-6.1 with uml.config: 2 to 7 minutes on 2 cores. The files for building modules are
+# kept beside it, so that a change in modules/ rebuilds only those, in seconds. Nothing is
+# installed but build tools, and those only by root. Every time, the kernel is booted once to check that
 # it runs here.
 #
-# Exit code: 0 the kernel is there and runs; 77 it cannot be had on this machine; else it does not
+# Exit code: 0 the kernel is there and runs; 77 it cannot be made on this machine; else it does not
 # build or does not run here. The reason is printed.
 set -euo pipefail
 here=$(cd "$(dirname "$0")" && pwd)
@@ -24,7 +24,7 @@ mkdir -p "$cache"
 exec 9> "$cache/lock"
 flock 9 # two test runs at once make one kernel
 
-# change_once FILE FROM TO: replaces a text that must stand in the file exactly once.
+# change_once FILE FROM TO: replaces a text that must be in the file exactly once.
 change_once() {
   [ "$(grep -cF "$2" "$1")" = 1 ] || {
     echo "setup.sh: $1 of $source_package no longer has \"$2\" once: look how it is said now"
@@ -33,7 +33,7 @@ change_once() {
   sed -i "s/$2/$3/" "$1"
 }
 
-# build_kernel FOLDER: from Debian's source, the kernel, its modules and what modules are built with.
+# build_kernel FOLDER: builds the kernel, its modules and the files for building modules.
 build_kernel() (
   set -e
   cd "$1"
@@ -60,7 +60,7 @@ build_kernel() (
   find out headers -name '*.o' -delete
 )
 
-# build_modules FOLDER: those of modules/, with what build_kernel has left there.
+# build_modules FOLDER: builds modules/ with build_kernel's files there.
 build_modules() (
   set -e
   rm -rf "$1/modules"
@@ -85,7 +85,7 @@ need_tools() {
 # logged COMMAND...: runs it; where it fails, shows the end of the log and ends.
 logged() {
   local built
-  # Not as a condition, in which bash would go on after a step that failed.
+  # Not as an `if`, in which bash would continue after a step that failed.
   set +e
   "$@" >> "$cache/build.log" 2>&1
   built=$?
@@ -99,7 +99,7 @@ logged() {
 stamp_of() { sha256sum | cut -c1-16; }
 is_stamped() { [ "$(cat "$cache/$1" 2> /dev/null)" = "$2" ]; }
 
-# The kernel is what its configuration and its recipe make it; the modules are built for that.
+# The kernel depends on its configuration and its recipe; the modules depend on the kernel.
 kernel_stamp=$({ declare -f change_once build_kernel; cat "$here/uml.config"; } | stamp_of)
 modules_stamp=$({ echo "$kernel_stamp"; declare -f build_modules; cat "$here"/modules/*; } | stamp_of)
 

@@ -34,7 +34,7 @@ Mutant = collections.namedtuple("Mutant", "kind file number before after")
 
 
 class Trouble(Exception):
-    """The tree or the command line is not in order; the text says what to do."""
+    """An error in the tree or the command line; the text says what to do."""
 
 
 def blanked(text):
@@ -83,7 +83,7 @@ def all_mutants(folders):
 
 
 def drawn(folders, seed):
-    """Mutants without end, each kind as often as any other."""
+    """An endless sequence of mutants, all kinds equally often."""
     mutants = all_mutants(folders)
     if not mutants:
         raise Trouble(f"no C++ source to change is under {' '.join(folders)}; name folders of {', '.join(AREAS)}")
@@ -98,7 +98,7 @@ def drawn(folders, seed):
 
 
 def end(process):
-    """Politely at first: ninja gives its compilers groups of their own and ends them itself."""
+    """SIGTERM first: ninja gives its compilers process groups of their own and ends them itself."""
     os.killpg(process.pid, signal.SIGTERM)
     try:
         process.wait(10)
@@ -107,7 +107,7 @@ def end(process):
 
 
 class Tree:
-    """A copy of the sources, built as the dev preset says; kept from run to run."""
+    """A copy of the sources, built with the dev preset; kept from run to run."""
 
     def __init__(self, work):
         self.source = work / "tree"
@@ -117,7 +117,7 @@ class Tree:
         self.read_targets()
 
     def copy(self):
-        """Writes what differs, with the present time: only so does the build see a reverted bug."""
+        """Writes files that differ, with the present time, so that the build notices a reverted bug."""
         listed = subprocess.run(["git", "ls-files", "-co", "--exclude-standard", "-z"], cwd=ROOT,
                                 check=True, capture_output=True).stdout.decode().split("\0")
         wanted = {name for name in listed if name and (ROOT / name).is_file()}
@@ -144,7 +144,7 @@ class Tree:
             raise Trouble(f"cmake failed:\n{done.stdout}")
 
     def read_targets(self):
-        """Which targets a source is part of, what depends on a target, and which targets are tests."""
+        """Reads the targets of each source, dependencies between targets, and the test targets."""
         reply = self.build / ".cmake/api/v1/reply"
         model = json.loads(next(reply.glob("codemodel-v2-*.json")).read_text())
         targets = {t["id"]: json.loads((reply / t["jsonFile"]).read_text())
@@ -184,7 +184,7 @@ class Tree:
 
     def run(self, command, seconds, **environment):
         """A process group of its own, so that nothing of a hanging test outlives its time."""
-        # With its own tree as base a compiler cache finds what another copy has compiled.
+        # With its own tree as base, a compiler cache finds results of other copies.
         environment = {"CCACHE_BASEDIR": str(self.source), "CCACHE_NOHASHDIR": "1", **os.environ, **environment}
         with subprocess.Popen(command, cwd=self.source, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
                               text=True, errors="replace", start_new_session=True, env=environment) as process:
@@ -216,7 +216,7 @@ def stages(tree, mutant, labels):
 
 
 def require_clean(tree, tests, clean):
-    """Without a mutant the tests pass; else nothing that follows would mean anything."""
+    """Checks that the tests pass without a mutant; otherwise later failures would mean nothing."""
     tests = [test for test in tests if test not in clean]
     if not tests:
         return
@@ -230,7 +230,7 @@ def require_clean(tree, tests, clean):
 
 
 def outcome(tree, tests):
-    """Of the tests with the mutant in the tree; None when they all pass."""
+    """The first failure with the mutant in the tree; None when all tests pass."""
     made = tree.make(tests)
     if made.returncode != 0:
         error = re.search(r"error: (.*)", made.stdout)
@@ -244,7 +244,7 @@ def outcome(tree, tests):
 
 
 def verdict(tree, mutant, labels, clean):
-    """What becomes of the mutant, and by which test."""
+    """The mutant's fate, and the test that caught it."""
     path = tree.source / mutant.file
     whole = path.read_text()
     lines = whole.split("\n")
@@ -302,7 +302,7 @@ def main():
 
 
 if __name__ == "__main__":
-    # Ended from outside, it takes its build or test with it.
+    # When it is ended from outside, it ends its build or test first.
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
     try:
         sys.exit(main())

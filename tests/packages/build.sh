@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # build.sh OUT [SOURCE]: builds the Debian packages of the tree as git sees it, uncommitted changes
-# included, into the folder OUT, which is emptied. The work lies in the folder SOURCE (OUT-source when
-# left out), which stays the same from run to run so that ccache knows the files again.
+# included, into the folder OUT, which is emptied. Works in the folder SOURCE (OUT-source when
+# left out), which stays the same from run to run so that ccache recognises the files.
 #
 # With DTACT_BUILT=FOLDER in the environment nothing is compiled: the programs are those that
 # `cmake --preset dev` built in FOLDER. Seconds instead of tens of minutes.

@@ -13,7 +13,7 @@ import unittest
 TREE = pathlib.Path(__file__).resolve().parents[2]
 FOLDER = pathlib.Path(sys.argv.pop(1))
 
-# Of a list that is the same on Debian 12 and 13, amd64 and arm64: LIB is the architecture's folder,
+# Patterns of a list that is the same on Debian 12 and 13, amd64 and arm64: LIB is the architecture's folder,
 # UNITS where this Debian has its units, and an asterisk any name.
 FILES = {
     "dtactd": """
@@ -72,7 +72,7 @@ FILES = {
         /usr/lib/python3/dist-packages/dtact/dtact.binpb
         /usr/lib/python3/dist-packages/dtact/py.typed""",
 }
-# systemd 252, Debian 12's, does not know what stands in it.
+# systemd 252, Debian 12's, does not know these keys.
 BACK_OFF = """
         UNITS/dtactd.service.d/back-off.conf
         UNITS/dtactd@.service.d/back-off.conf"""
@@ -163,7 +163,7 @@ class Contents(unittest.TestCase):
             "deb-systemd-invoke $_dh_action 'dtactd.service'",
         ):
             self.assertIn(snippet, postinst)
-        # The user is there before the folders that belong to it, its groups before the devices are given to
+        # The user is made before its folders, its groups before the devices are given to
         # them, and all before the start.
         for steps in (("udevadm trigger", "udevadm settle"), ("--create",)):
             order = [postinst.index(word) for word in ("systemd-sysusers", *steps, "deb-systemd-invoke")]
@@ -172,18 +172,18 @@ class Contents(unittest.TestCase):
         self.assertIn("deb-systemd-helper purge 'dtactd.service'", control("dtactd", "postrm"))
         for script in ("postinst", "prerm", "postrm"):
             self.assertNotIn("#DEBHELPER#", control("dtactd", script))
-            # No instance of the template starts or is enabled by itself.
+            # No instance of the template starts or is enabled automatically.
             self.assertNotRegex(control("dtactd", script), r"(invoke start|enable) 'dtactd@")
 
     def test_what_stands_beside_the_daemon_waits_to_be_wanted(self) -> None:
         postinst = control("dtact-tools", "postinst")
         both = r"'?dtact-perceive\.service'? '?dtact-web\.service'?"
-        # Not started, but an upgrade leaves none that runs with the program of before, and a removal none.
+        # It is not started, but an upgrade restarts a running one, and a removal stops it.
         self.assertRegex(postinst, f"deb-systemd-invoke try-restart {both}")
         self.assertNotRegex(postinst, "deb-systemd-invoke (?!try-restart )")
         self.assertRegex(control("dtact-tools", "prerm"), f"deb-systemd-invoke stop {both}")
         for unit in ("dtact-perceive.service", "dtact-web.service"):
-            # Enabled again where somebody had enabled it, and nowhere else.
+            # It is enabled again where it had been enabled, and nowhere else.
             self.assertIn(f"deb-systemd-helper debian-installed '{unit}'", postinst)
             self.assertRegex(control("dtact-tools", "postrm"), f"deb-systemd-helper purge .*'{unit}'")
 
@@ -193,7 +193,7 @@ class Contents(unittest.TestCase):
         python = field("python3-dtact", "Depends")
         for needed in ("python3-numpy", "python3-protobuf", "python3-zstandard"):
             self.assertIn(needed, python)
-        # Without anything compiled: one package for every machine and every Python from 3.11 on.
+        # Nothing is compiled: one package for every machine and every Python from 3.11 on.
         self.assertNotRegex(python, r"python3 \(<<")
         self.assertEqual(field("python3-dtact", "Architecture"), "all")
         self.assertIn("opencv-calib3d", field("dtact-tools", "Depends"))
@@ -222,7 +222,7 @@ class Contents(unittest.TestCase):
         self.assertIn("node_modules/three", bundled)
         for name, licence in bundled.items():
             self.assertIn(f"{name}/*", licences)
-            # As Debian calls them; those of one kind that differ in their words are distinguished at the end.
+            # Debian's names of licences; ones of a kind that differ in their words are distinguished at the end.
             wanted = licence.strip("()").replace("MIT", "Expat").split(" AND ")
             for one, found in zip(wanted, licences[f"{name}/*"], strict=True):
                 self.assertRegex(found, f"(?i)^{one}(-|$)", name)

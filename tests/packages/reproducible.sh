@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# reproducible.sh FOLDER: builds the packages in FOLDER, which build.sh made, once more in another
+# reproducible.sh FOLDER: builds the packages in FOLDER, which build.sh made, again in another
 # place, time zone and language, and compares them byte for byte. DTACT_BUILT as for build.sh.
 #
 # Exit code: 0 the same bytes; 77 there are no packages; else failed.

@@ -6,7 +6,7 @@
 # build/dev/packages-debian12-arm64, installs them there, has the daemon serve a client on the simulated
 # sensor, each under qemu-user, and purges them.
 #
-# Exit code: 0 passed; 77 such a chroot cannot be had here (the reason is printed); else failed.
+# Exit code: 0 passed; 77 the chroot cannot be made here (the reason is printed); else failed.
 set -euo pipefail
 suite=bookworm
 root=${CHROOT_CACHE:-$HOME/.cache/dtactd-chroots}/$suite-arm64
@@ -17,7 +17,7 @@ root=${CHROOT_CACHE:-$HOME/.cache/dtactd-chroots}/$suite-arm64
 foreign=()
 for package in "$@"; do
   case $package in
-    libcli11-dev | libeigen3-dev) foreign+=("$package") ;;  # have no architecture
+    libcli11-dev | libeigen3-dev) foreign+=("$package") ;;  # these have no architecture
     lib* | prometheus-cpp-dev | umockdev) foreign+=("$package:arm64") ;;
     *) foreign+=("$package") ;;
   esac

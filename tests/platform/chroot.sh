@@ -1,5 +1,5 @@
 # shellcheck shell=bash disable=SC2154
-# Sourced by the scripts of this folder: a Debian of its own in a folder, kept from run to run.
+# Sourced by the scripts of this folder: a Debian system in a folder, kept from run to run.
 #
 # Each script sets before sourcing:
 #   suite   Debian's release
@@ -12,7 +12,7 @@ skip() {
 
 source_folder=$(cd "$(dirname "${BASH_SOURCE[0]}")/../.." && pwd)
 
-# inside COMMAND: runs a shell command in the chroot, with /proc and /sys, which are gone afterwards.
+# inside COMMAND: runs a shell command in the chroot, with /proc and /sys mounted meanwhile.
 inside() {
   local page=OFF
   if [ -e "$root/page/index.html" ]; then page=/page; fi
@@ -62,7 +62,7 @@ copy_source() {
   mkdir -p "$root/source"
   (cd "$source_folder" && git ls-files -z --cached --others --exclude-standard \
     | tar --null --files-from=- --ignore-failed-read -c) | tar -x -C "$root/source"
-  # The page is the same everywhere, and built here: the chroot needs no npm.
+  # The page is the same everywhere, and built outside: the chroot needs no npm.
   if [ -e "$source_folder/clients/web/page/package.json" ]; then
     "$source_folder/clients/web/build_page.sh" "$source_folder/clients/web/page" "$source_folder" \
       "$root.npm" "$root/page" npm
@@ -70,8 +70,8 @@ copy_source() {
 }
 
 # package OUT ARCHITECTURE [BUILT]: Debian packages of the source, into the folder OUT, which is emptied.
-# With a folder BUILT of what `cmake --preset dev` built in the chroot, nothing is compiled. Then looks at
-# what they hold.
+# With a folder BUILT of programs that `cmake --preset dev` built in the chroot, nothing is compiled. Then checks
+# their contents.
 package() {
   local out=$1 architecture=$2 built=${3-} options=
   [ -z "$built" ] || options=--no-check-builddeps

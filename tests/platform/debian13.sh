@@ -3,7 +3,7 @@
 # the Debian packages named, and runs the unit tests there. Makes Debian packages of what it built, in
 # build/dev/packages-debian13-amd64 for example.
 #
-# Exit code: 0 passed; 77 such a chroot cannot be had here (the reason is printed); else failed.
+# Exit code: 0 passed; 77 the chroot cannot be made here (the reason is printed); else failed.
 set -euo pipefail
 suite=trixie
 root=${CHROOT_CACHE:-$HOME/.cache/dtactd-chroots}/$suite

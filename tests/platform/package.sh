@@ -1,10 +1,10 @@
 #!/usr/bin/env bash
 # package.sh SUITE ARCHITECTURE OUT: builds the Debian packages for Debian's release SUITE (bookworm,
 # trixie) and ARCHITECTURE (amd64, arm64) into the folder OUT, which is emptied: in a chroot, and for
-# another architecture than this machine's by a cross-build. What they are built with is installed as
-# debian/control says it.
+# another architecture than this machine's by a cross-build. Build dependencies are installed as in
+# debian/control.
 #
-# Exit code: 0 built; 77 such a chroot cannot be had here (the reason is printed); else failed.
+# Exit code: 0 built; 77 the chroot cannot be made here (the reason is printed); else failed.
 set -euo pipefail
 suite=$1 architecture=$2 out=$(readlink -m "$3")
 native=$(dpkg --print-architecture)

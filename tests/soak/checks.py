@@ -1,4 +1,4 @@
-"""What of all that a soak has seen is a fault. Every limit stands here, with its reason."""
+"""The faults in what a soak has seen. Every limit is here, with its reason."""
 from __future__ import annotations
 
 import math
@@ -11,50 +11,50 @@ from record import Record, Rest, Seen
 
 # ------------------------------------------------------------ limits
 
-#: Of both, at every rest: then the same three clients are connected, and nothing is under way.
+#: Both at every rest, when the same three clients are connected and nothing is under way.
 MAX_DESCRIPTORS_MORE = 0
 MAX_THREADS_MORE = 0
 #: Rests before the figures count: by then every kind of client has come once, and the allocator has
 #: its arenas. In a run that has time for it, every kind of episode as well.
 WARM_UP_RESTS = 3
 LONG_WARM_UP_RESTS = 1 + len(plan.KINDS)
-#: Fewer say nothing of memory, which sanitizers hold back for a while as well.
+#: Fewer are too few to judge memory, which sanitizers hold back for a while as well.
 MIN_RESTS_FOR_MEMORY = 8
-#: From the median of the first rests after that to the median of the last. glibc gives back what is
+#: From the median of the first rests after warm-up to the median of the last. glibc returns memory that is
 #: free at a heap's end only above 4 MB (M_TRIM_THRESHOLD in daemon/app/daemon.cpp), and each peak of
-#: what clients have waiting raises what it keeps; half as much again is more than that.
+#: what clients have waiting raises what it keeps; the limit is half as much again.
 MAX_RESIDENT_KIB_MORE = 6 * 1024
-#: A daemon that runs for a year and grows by this has grown by 4.4 GB: what is asked is none at all, and
-#: this is what two hours can tell from the wandering of single rests by Theil and Sen's slope. It is asked
-#: of the resident memory but for what the allocator keeps for later, which grows to the largest peak of
-#: the load and no further (in half an hour, while the blocks in use stay the same): a slope says nothing
-#: of something with an end, and that end is in the limit above.
+#: The goal is no growth; a daemon that grows by this for a year has grown by 4.4 GB. Two hours can resolve
+#: this much with Theil and Sen's slope, because single rests scatter. The slope is taken of the resident
+#: memory without the allocator's free memory. That grows to the largest peak of the load and no further (in
+#: half an hour, while the blocks in use stay the same): a slope cannot judge growth that ends, so the limit
+#: above judges it.
 MAX_TAKEN_KIB_PER_HOUR = 512
-#: Of the blocks in use as the allocator counts them, which is where a leak shows whatever the pages
+#: Blocks in use as the allocator counts them: a leak shows here whatever the pages
 #: of the heap do.
 MAX_HEAP_KIB_MORE, MAX_HEAP_KIB_PER_HOUR = 1024, 128
-#: Slopes, and latency at the end against the beginning, are judged from so long a run on.
+#: Slopes, and latency at the end against the beginning, are judged in runs of at least this length.
 MIN_S_FOR_DRIFT = 1800
 #: 22 calibrations of two files (the store keeps 20 besides the current one and the one before), with
 #: the reference and the link.
 MAX_STATE_FILES = 60
 MAX_STATE_KIB = 22 * 800
-#: Medians over a fifth of the run, at its end against its beginning. Half as much again and a
-#: millisecond is what another program on the same cores does.
+#: Medians over a fifth of the run, at its end against its beginning. Another program on the same
+#: cores causes half as much again and a millisecond.
 MAX_LATENCY_RATIO, MAX_LATENCY_MS_MORE = 1.5, 1.0
-#: Mean absolute error of one frame, millimetres, while nothing speaks against its depth. Inside the
+#: Mean absolute error of one frame, millimetres, while no health flag is set. Inside the
 #: contact the ball reads as in tests/e2e/stream_test.cpp; edges of nuts and cylinders are
 #: blurred by the gel (README, where methods fail).
-MAX_ERROR_MM = {"A": 0.05, "B": 0.15, "untouched": 0.01}
-#: Outside of a contact there are the bulge and the contact's own blurred edge.
-MAX_OUTSIDE_MM = {"A": 0.03, "B": 0.03, "untouched": 0.01}
-#: Of the pixels inside the contact, not to be believed.
+MAX_ERROR_MM = {"A": 0.05, "B": 0.15, "no_contact": 0.01}
+#: The bulge and the contact's own blurred edge are outside the contact.
+MAX_OUTSIDE_MM = {"A": 0.03, "B": 0.03, "no_contact": 0.01}
+#: Share of untrusted pixels inside the contact.
 MAX_UNTRUSTED = 0.05
-#: The median over the last fifth against the first: the depth must not wander.
+#: Median of the last fifth minus that of the first: the depth must not drift.
 MAX_ERROR_MM_MORE = 0.005
 
 
-# ------------------------------------------------------------ what of it is a fault
+# ------------------------------------------------------------ the checks
 
 @dataclass(frozen=True)
 class Verdict:
@@ -62,7 +62,7 @@ class Verdict:
     measured: str
     limit: str
     faults: tuple[str, ...] = ()
-    judged: bool = True  #: False: too short a run to say
+    judged: bool = True  #: False: the run is too short to judge
 
     @property
     def word(self):
@@ -70,7 +70,7 @@ class Verdict:
 
 
 def slope(points: list[tuple[float, float]]) -> float:
-    """Theil and Sen's: the median of the slopes between all pairs, so that a fourth of wild points
+    """Theil and Sen's: the median of the slopes between all pairs, so that a fourth of outliers
     moves it little."""
     slopes = [(y2 - y1) / (x2 - x1) for i, (x1, y1) in enumerate(points)
               for x2, y2 in points[i + 1:] if x2 != x1]
@@ -86,7 +86,7 @@ def ends(values: list[float]) -> tuple[float, float]:
 def verdicts(record: Record) -> list[Verdict]:
     long = record.seconds >= MIN_S_FOR_DRIFT
     return [*_held(record.rests, long), *_latency(record.seen, long), _frames(record),
-            _conditions(record.seen), _camera(record), *_depth(record.seen, long), _answers(record),
+            _health(record.seen), _camera(record), *_depth(record.seen, long), _answers(record),
             _log(record.log), _end(record.ended)]
 
 
@@ -163,37 +163,37 @@ def _frames(record: Record) -> Verdict:
                    "some in every episode, in order of sequence and time", tuple(faults))
 
 
-def _conditions(seen: list[Seen]) -> Verdict:
+def _health(seen: list[Seen]) -> Verdict:
     faults = []
-    reaching: frozenset[str] = frozenset()  # what a late undo leaves goes on into the next episode
+    reaching: frozenset[str] = frozenset()  # a late undo reaches into the next episode
     for s in seen:
         where = f"episode {s.episode.index} ({s.episode.kind})"
         may = s.episode.must | s.episode.may | plan.MACHINE | reaching
         reaching = s.episode.must | s.episode.may if s.late else frozenset()
         if not s.late:
-            for name in sorted(s.episode.must - s.conditions):
-                faults.append(f"{where}: {name} was never told")
+            for name in sorted(s.episode.must - s.flags):
+                faults.append(f"{where}: {name} was never reported")
             for name in sorted(s.episode.events - s.events):
                 faults.append(f"{where}: no {name} event came")
-        for name in sorted(s.conditions - may):
-            faults.append(f"{where}: {name} was told without a reason")
+        for name in sorted(s.flags - may):
+            faults.append(f"{where}: {name} was reported without a reason")
         for name in sorted(s.left - plan.MACHINE - reaching):
             faults.append(f"{where}: {name} was left at its end")
     judged = sum(1 for s in seen if s.episode.must and not s.late)
-    # A machine so busy that the camera skips more than a second: the next episodes tell.
+    # The machine is so busy that the camera skips more than a second: the next episodes show it.
     unseen = sum(1 for s in seen if not s.cleared)
     if unseen > max(1, len(seen) // 10):
         faults.append(f"no frame came at the end of {unseen} episodes")
     late = sum(1 for s in seen if s.late)
     if late > max(1, len(seen) // 10):
         faults.append(f"the commands of {late} episodes came too late")
-    return Verdict("conditions", f"{judged} scripted faults, {unseen} ends unseen, {late} late",
-                   "each told, and cleared", tuple(faults))
+    return Verdict("health flags", f"{judged} scripted faults, {unseen} ends unseen, {late} late",
+                   "each reported, and cleared", tuple(faults))
 
 
 def _camera(record: Record) -> Verdict:
-    """Of frames_lost and camera_fault, which a busy machine raises as well: that they are told of what
-    was scripted, and of nothing that did not happen. The daemon's times on both sides, so that it does
+    """Checks frames_lost and camera_fault, which a busy machine raises as well: they are reported for every
+    scripted fault and for nothing else. Compares times of the daemon only, so that it does
     not matter how late the frames were."""
     faults = []
     judged = unseen = 0
@@ -212,15 +212,15 @@ def _camera(record: Record) -> Verdict:
                 judged += 1
                 if not any(span[0] < at < span[1] and "camera_fault" in health
                            for at, health in record.states):
-                    faults.append(f"{what}: camera_fault was not told meanwhile")
+                    faults.append(f"{what}: camera_fault was not reported meanwhile")
             elif span[1] - span[0] < plan.LOST_NS:
                 judged += 1
                 if "frames_lost" not in struck.after.health:
-                    faults.append(f"{what}: frame {struck.after.sequence} does not tell frames_lost")
+                    faults.append(f"{what}: frame {struck.after.sequence} does not report frames_lost")
             else:
                 unseen += 1
         if s.lost_unseen:
-            faults.append(f"{where}: {s.lost_unseen} frames tell frames_lost, and none was lost in the "
+            faults.append(f"{where}: {s.lost_unseen} frames report frames_lost, and none was lost in the "
                           "second before")
         if any(begin < frame.taken and frame.published < end
                for frame in s.cleared for begin, end in trouble):
@@ -228,11 +228,11 @@ def _camera(record: Record) -> Verdict:
     if unseen > max(1, len(record.seen) // 10):
         faults.append(f"no frame came soon before or after {unseen} faults of the camera")
     return Verdict("what the camera swallows", f"{judged} faults, {unseen} with no frame near",
-                   "each told as its frames are missing, nothing told beyond", tuple(faults))
+                   "each reported while its frames are missing, nothing else", tuple(faults))
 
 
 def _trouble(states: list[tuple[int, tuple[str, ...]]]) -> list[tuple[float, float]]:
-    """From when to when the daemon told camera_fault."""
+    """Spans in which the daemon reported camera_fault."""
     ends = [float(at) for at, _ in states[1:]] + [math.inf]
     return [(at, end) for (at, health), end in zip(states, ends) if "camera_fault" in health]
 
@@ -245,18 +245,18 @@ def _depth(seen: list[Seen], long: bool) -> list[Verdict]:
             made.append(Verdict(f"depth, {place}", "no frame", "one at least",
                                 (f"no depth of {place} was judged",)))
             continue
-        which = 2 if place == "untouched" else 1
+        which = 2 if place == "no_contact" else 1
         errors = [d[which] for d in of]
         faults = [f"episode {s.episode.index} ({s.episode.kind}), {place}: {inside:.4f} mm wrong "
-                  f"inside, {outside:.4f} outside, {100 * untrusted:.0f} % untrusted, and no condition "
-                  "said so"
+                  f"inside, {outside:.4f} outside, {100 * untrusted:.0f} % untrusted, and no health flag "
+                  "was set"
                   for s, inside, outside, untrusted in of
                   if inside > most or outside > MAX_OUTSIDE_MM[place] or untrusted > MAX_UNTRUSTED]
         if len(faults) > 5:
             faults = faults[:5] + [f"and {len(faults) - 5} frames more of {place}"]
         first, last = ends(errors)
         if long and last - first > MAX_ERROR_MM_MORE:
-            faults.append(f"depth of {place} wandered: {first:.4f} mm wrong, then {last:.4f}")
+            faults.append(f"depth of {place} drifted: {first:.4f} mm wrong, then {last:.4f}")
         made.append(Verdict(
             f"depth, {place}: mean absolute error, median and worst of {len(of)} frames",
             f"{statistics.median(errors):.4f}, {max(errors):.4f} mm", f"{most} mm", tuple(faults)))

@@ -1,4 +1,4 @@
-"""What a soak takes for a fault, on figures made by hand: every check finds its fault, and none finds
+"""A soak's checks on hand-made figures: every check finds its fault, and none finds
 one in a healthy run."""
 import pathlib
 import sys
@@ -13,7 +13,7 @@ from daemon import Held, log_lines  # noqa: E402
 from record import Record, Rest, Struck  # noqa: E402
 
 HOUR = 3600
-PERIOD = 16_666_667  # of the camera, ns
+PERIOD = 16_666_667  # the camera's, ns
 MS = 1_000_000
 
 
@@ -24,7 +24,7 @@ def held(**changes):
 
 
 def healthy(kinds=("quiet", "unplug"), rests=20):
-    """A run of two hours in which all is well; the rests stand for its whole length."""
+    """A run of two hours without a fault; the rests stand for its whole length."""
     return run_of([plan.Episode(i, kind) for i, kind in enumerate(kinds)],
                   [frame(n) for n in range(0, plan.EPISODE * len(kinds), 10)], rests)
 
@@ -36,8 +36,8 @@ def run_of(episodes, frames, rests=20):
     record.rests = [Rest(i * 2 * HOUR / rests, i, held(), names, 0.5) for i in range(rests)]
     record.take("frames", frames)
     for seen in record.seen:
-        for place in ("A", "B", "untouched"):
-            seen.depths.append((place, 0.02 if place != "untouched" else 0.0, 0.002, 0.0))
+        for place in ("A", "B", "no_contact"):
+            seen.depths.append((place, 0.02 if place != "no_contact" else 0.0, 0.002, 0.0))
     return record
 
 
@@ -46,11 +46,11 @@ def frame(sequence, health=(), late_ns=0):
     return (sequence, taken, taken, taken + 1_000_000, taken + 3_000_000 + late_ns, health)
 
 
-def struck(kind, condition, *, came=(), reported=(), late_ns=0, states=()):
-    """The camera swallows the frames 1000 to 1003; 1004 tells `reported`. `states`: since when, ns, and the
-    conditions of the daemon's events."""
+def struck(kind, flag, *, came=(), reported=(), late_ns=0, states=()):
+    """The camera swallows the frames 1000 to 1003; 1004 reports `reported`. `states`: since when, ns, and the
+    health flags of the daemon's events."""
     episodes = [plan.Episode(0, "quiet"),
-                plan.Episode(1, kind, [(kind, 1000, 4)], must=frozenset({condition}))]
+                plan.Episode(1, kind, [(kind, 1000, 4)], must=frozenset({flag}))]
     frames = [frame(n, reported if n == 1004 else ()) for n in range(2 * plan.EPISODE)
               if n not in range(1000, 1004) or n in came]
     late = [(n, taken, ready, published + late_ns, received + late_ns, health)
@@ -112,7 +112,7 @@ class Checks(unittest.TestCase):
             rest.held = held(resident_kib=40_000 + 400 * i)
         self.finds(record)
 
-    def test_wandering_memory_is_no_leak(self):
+    def test_varying_memory_is_no_leak(self):
         record = healthy()
         for i, rest in enumerate(record.rests):
             rest.held = held(resident_kib=50_000 + (0, 700, -300, 500)[i % 4])
@@ -128,7 +128,7 @@ class Checks(unittest.TestCase):
         self.finds(record, "resident memory grew from")
 
     def test_a_leak_shows_before_the_resident_size_does(self):
-        record = healthy()  # what is kept for later takes it up
+        record = healthy()  # the allocator's free memory takes it up
         for i, rest in enumerate(record.rests):
             rest.held = held(heap_kib=30_000 + i * 20, kept_kib=5_000 - i * 20)
         self.finds(record, "memory in use grows by 200 kB an hour")
@@ -165,18 +165,18 @@ class Checks(unittest.TestCase):
         record.seen[0].cleared = []
         self.finds(record, "no frame in episode 1", "no frame came at the end of 2 episodes")
 
-    def test_conditions(self):
+    def test_health(self):
         record = healthy()
         record.seen[1].episode.must = frozenset({"image_repeated"})
         record.seen[1].episode.events = frozenset({"light"})
-        self.finds(record, "image_repeated was never told", "no light event came")
+        self.finds(record, "image_repeated was never reported", "no light event came")
         record.seen[1].late = True
         self.finds(record)
         record.seen[0].late = True
         self.finds(record, "the commands of 2 episodes came too late")
         record.seen[0].late = False
-        record.seen[0].conditions.add("light_drifted")
-        self.finds(record, "light_drifted was told without a reason")
+        record.seen[0].flags.add("light_drifted")
+        self.finds(record, "light_drifted was reported without a reason")
         record = healthy()
         record.seen[0].episode.may = frozenset({"reference_stale"})
         record.take("frames", [frame(plan.EPISODE * 2 - 1)])
@@ -186,28 +186,28 @@ class Checks(unittest.TestCase):
     def test_what_a_late_command_does_reaches_into_the_next_episode_only(self):
         record = healthy(["light", "quiet", "quiet"] * 10)
         record.seen[0].episode.must = frozenset({"light_unsettled"})
-        record.seen[0].conditions = {"light_unsettled"}
-        record.seen[0].left = record.seen[1].conditions = {"light_unsettled"}
-        self.finds(record, "left at its end", "told without a reason")
+        record.seen[0].flags = {"light_unsettled"}
+        record.seen[0].left = record.seen[1].flags = {"light_unsettled"}
+        self.finds(record, "left at its end", "reported without a reason")
         record.seen[0].late = True
         self.finds(record)
-        record.seen[2].conditions = {"light_unsettled"}
-        self.finds(record, "episode 2 (quiet): light_unsettled was told without a reason")
+        record.seen[2].flags = {"light_unsettled"}
+        self.finds(record, "episode 2 (quiet): light_unsettled was reported without a reason")
 
     def test_what_a_busy_machine_does_is_no_fault(self):
         record = healthy()
-        record.seen[0].conditions |= {"frames_lost", "not_realtime", "camera_slow"}
+        record.seen[0].flags |= {"frames_lost", "not_realtime", "camera_slow"}
         self.finds(record)
 
     def test_lost_frames_are_reported_by_the_frame_behind_them(self):
         self.finds(struck("drop", "frames_lost", reported=("frames_lost",)))
-        # That the machine loses frames by itself proves nothing.
+        # Losses that the machine causes prove nothing.
         record = struck("drop", "frames_lost")
-        record.seen[1].conditions.add("frames_lost")
-        self.finds(record, "frames 1000 to 1003: frame 1004 does not tell frames_lost")
-        # So late that the daemon need not tell any more.
+        record.seen[1].flags.add("frames_lost")
+        self.finds(record, "frames 1000 to 1003: frame 1004 does not report frames_lost")
+        # So late that the daemon need not report it any more.
         record = struck("drop", "frames_lost", late_ns=plan.LOST_NS)
-        record.seen[1].conditions.add("frames_lost")
+        record.seen[1].flags.add("frames_lost")
         self.finds(record)
         self.finds(struck("drop", "frames_lost", reported=("frames_lost",), came=[1002]), "1 of them came")
 
@@ -220,7 +220,7 @@ class Checks(unittest.TestCase):
             return run_of([plan.Episode(i, "quiet") for i in range(2)], frames)
 
         self.finds(steady(1))
-        self.finds(steady(1.1), "episode 1 (quiet): 6 frames tell frames_lost, and none was lost")
+        self.finds(steady(1.1), "episode 1 (quiet): 6 frames report frames_lost, and none was lost")
 
     def test_camera_trouble_is_reported_while_the_camera_is_away(self):
         def stall(*states):
@@ -229,10 +229,10 @@ class Checks(unittest.TestCase):
         trouble = ("camera_fault",)
         away, back = (1002 * PERIOD, trouble), (1004 * PERIOD + 1, ())
         self.finds(stall(away, back))
-        self.finds(stall(), "camera_fault was never told", "camera_fault was not told meanwhile")
+        self.finds(stall(), "camera_fault was never reported", "camera_fault was not reported meanwhile")
         # A busy machine raises it at any time.
-        self.finds(stall((970 * PERIOD, trouble), (971 * PERIOD + 1, ())), "not told meanwhile")
-        # Frames end it, of which the episode's last seconds are looked at.
+        self.finds(stall((970 * PERIOD, trouble), (971 * PERIOD + 1, ())), "not reported meanwhile")
+        # Frames end it; those of the episode's last seconds are checked.
         self.finds(stall(away), "camera_fault went on while frames came")
         last = 2 * plan.EPISODE - 30
         begins = (last * PERIOD + 2 * MS, trouble)
@@ -256,11 +256,11 @@ class Checks(unittest.TestCase):
         record = healthy(["quiet"] * 10)
         for seen in record.seen[8:]:
             seen.depths = [("A", 0.026, 0.002, 0.0)] + seen.depths[1:]
-        self.finds(record, "depth of A wandered: 0.0200 mm wrong, then 0.0260")
+        self.finds(record, "depth of A drifted: 0.0200 mm wrong, then 0.0260")
         record = healthy()
         for seen in record.seen:
             seen.depths = seen.depths[:2]
-        self.finds(record, "no depth of untouched was judged")
+        self.finds(record, "no depth of no_contact was judged")
 
     def test_clients_log_and_end(self):
         record = healthy()
@@ -276,7 +276,7 @@ class Checks(unittest.TestCase):
 
 class Slope(unittest.TestCase):
     def test_is_the_median_of_all_pairs(self):
-        # Slopes 1, 1, 1, and to the wild point 8, 4.5 and 10 / 3.
+        # Slopes 1, 1, 1, and to the outlier 8, 4.5 and 10 / 3.
         self.assertAlmostEqual(checks.slope([(0, 0.0), (1, 1.0), (2, 2.0), (3, 10.0)]), 13 / 6)
         self.assertEqual(checks.slope([(float(i), 2.0 * i) for i in range(9)] + [(9.0, 900.0)]), 2.0)
         self.assertEqual(checks.slope([(1.0, 5.0)]), 0.0)
@@ -299,7 +299,7 @@ class Plan(unittest.TestCase):
     def test_every_command_has_its_time(self):
         for episode in plan.episodes(4, 1 + len(plan.KINDS)):
             times = [time for step in episode.steps for time in (step.sequence, step.latest)]
-            if len(episode.steps) == 2:  # what is undone is to be seen until then
+            if len(episode.steps) == 2:  # the change must be visible until it is undone
                 self.assertLess(episode.steps[0].sequence, episode.steps[1].sequence)
             for step in episode.steps:
                 self.assertLess(step.sequence, step.latest)
@@ -309,7 +309,7 @@ class Plan(unittest.TestCase):
         episode = plan.Episode(2, "quiet")  # from frame 1920 on
         self.assertEqual([episode.place(1920 + round(60 * s)) for s in
                           (0.0, 2.0, 3.1, 4.0, 4.9, 9.0, 15.0)],
-                         [None, "untouched", None, "A", None, "B", "untouched"])
+                         [None, "no_contact", None, "A", None, "B", "no_contact"])
         episode.blind = (1920 + 230, 1920 + 250)
         self.assertIsNone(episode.place(1920 + 240))
 

@@ -21,17 +21,17 @@ import numpy as np
 import dtact
 import plan
 
-#: Nothing that a client waits for takes so long, however busy the machine.
+#: No wait of a client takes this long, however busy the machine.
 TIMEOUT_S = 120.0
 CROP = (slice(10, 590), slice(110, 690))  # of the picture, in the depth map: calibrate()'s --crop
 VISITORS = 10
 
 
 def truth_maps(folder: pathlib.Path, width: int, height: int):
-    """What soak_truth wrote: place → (millimetres, where it touches), as the depth map lies."""
+    """soak_truth's files: place → (millimetres, contact), laid out like the depth map."""
     maps = {}
     pixels = width * height
-    for name in ("A", "B", "untouched"):
+    for name in ("A", "B", "no_contact"):
         data = (folder / f"{name}.truth").read_bytes()
         mm = np.frombuffer(data, np.float32, pixels).reshape(height, width)[CROP]
         contact = np.frombuffer(data, np.uint8, pixels, 4 * pixels).reshape(height, width)[CROP]
@@ -42,7 +42,7 @@ def truth_maps(folder: pathlib.Path, width: int, height: int):
 def guarded(queue, name, stop, work):
     try:
         work()
-    except Exception:  # whatever it is, it goes into the report
+    except Exception:  # any error goes into the report
         if not stop.is_set():
             queue.put(("fault", f"{name}: {traceback.format_exc(limit=4)}"))
 
@@ -87,7 +87,7 @@ def judge(address, queue, stop, episodes, truths, per_second):
 
 def depth_error(depth_mm, truth_mm, contact):
     """Mean absolute error in millimetres inside the true contact and outside, and the share of pixels
-    inside that are not to be believed. Without contact the first is 0."""
+    inside that are untrusted. Without contact the first is 0."""
     error = np.abs(depth_mm - truth_mm)
     inside, believed = error[contact], ~np.isnan(error)
     untrusted = float(np.isnan(inside).mean()) if inside.size else 0.0
@@ -97,7 +97,7 @@ def depth_error(depth_mm, truth_mm, contact):
             float(outside.mean()) if outside.size else 0.0, untrusted)
 
 
-# ------------------------------------------------------------ those that come and go
+# ------------------------------------------------------------ clients that come and go
 
 def visitors(address, queue, stop, opened, inside, seed):
     """VISITORS threads. They come while `opened` is set; `inside` counts those that are connected."""
@@ -125,7 +125,7 @@ def visitors(address, queue, stop, opened, inside, seed):
 
 
 def visit(address, rng, index, opened):
-    """Comes, wants something, asks something, and goes in one of the ways in which clients go."""
+    """Connects, subscribes, makes requests, and disconnects in one of the ways in which clients do."""
     answered = 0
     s = dtact.connect(address, program=f"soak visitor {index}", timeout=TIMEOUT_S)
     try:
@@ -164,7 +164,7 @@ def subscription(rng):
 
 
 def ask(s, rng):
-    """Some requests, one of which the daemon has to refuse. How many were answered."""
+    """Makes some requests, one of which the daemon has to refuse. Returns how many were answered."""
     count = rng.randint(0, 3)
     for _ in range(count):
         try:

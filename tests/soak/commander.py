@@ -1,4 +1,4 @@
-"""Does what the plan says when its frame has come, and hears every event."""
+"""Executes the plan's steps when their frames come, and receives every event."""
 from __future__ import annotations
 
 import time
@@ -8,7 +8,7 @@ from clients import TIMEOUT_S
 
 
 class Commander:
-    """`note(text)`: what must not happen. `answers`: how many requests were answered."""
+    """`note(text)` receives faults. `answers`: how many requests were answered."""
 
     def __init__(self, address, calibration, note):
         self._client = dtact.connect(address, program="soak commander", timeout=TIMEOUT_S)
@@ -20,7 +20,7 @@ class Commander:
         self.events: list[tuple[int, str, object]] = []  #: sequence, kind, event
 
     def listen(self, seconds):
-        """Takes what comes for so long."""
+        """Reads messages for `seconds`."""
         until = time.monotonic() + seconds
         while (left := until - time.monotonic()) > 0:
             item = self._client.next(timeout=left)
@@ -32,7 +32,7 @@ class Commander:
     def _heard(self, event):
         kind = type(event).__name__.removesuffix("Event").lower()
         self.events.append((event.sequence, kind, event))
-        # While the camera is away no frame comes, but the events tell.
+        # No frame comes while the camera is away, but events do.
         self.sequence = max(self.sequence, event.sequence)
 
     def in_time(self, step) -> bool:

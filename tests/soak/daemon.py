@@ -1,4 +1,4 @@
-"""dtactd as a soak starts it, and what the kernel says about it."""
+"""dtactd as a soak starts it, and the kernel's figures about it."""
 from __future__ import annotations
 
 import atexit
@@ -35,7 +35,7 @@ def run(*command) -> str:
 
 
 def calibrate(programs: Programs, folder: pathlib.Path, name: str, seed: int) -> pathlib.Path:
-    """As a user does it, from pictures with the noise of `seed`: untouched, and a ball held."""
+    """Calibrates as a user does, from pictures with the noise of `seed`: without contact, then a ball held."""
     scene = ["--scene", SCENES / "calibrate_ball.toml", "--seed", seed]
     pictures = folder / "pictures" / name
     run(programs.render, *scene, "--frames", "0:32", "-o", pictures / "reference")
@@ -49,14 +49,14 @@ def calibrate(programs: Programs, folder: pathlib.Path, name: str, seed: int) ->
 
 @dataclass(frozen=True)
 class Held:
-    """What the process holds."""
+    """Resources of the process."""
 
     descriptors: int
     threads: int
     resident_kib: int
-    anonymous_kib: int  #: of it; the rest are pages of files, which come and go as the kernel likes
+    anonymous_kib: int  #: part of resident_kib; the rest are pages of files, which come and go as the kernel likes
     heap_kib: int  #: blocks of the allocator that are in use
-    kept_kib: int  #: and what it keeps for later ones
+    kept_kib: int  #: free blocks that the allocator keeps
     cpu_s: float  #: used since its start
     state_files: int
     state_kib: int
@@ -64,7 +64,7 @@ class Held:
 
     @property
     def taken_kib(self) -> int:
-        """Of what is resident, all but what the allocator keeps."""
+        """Resident memory without the allocator's free blocks."""
         return self.resident_kib - self.kept_kib
 
 
@@ -83,7 +83,7 @@ class Daemon:
             self._process = subprocess.Popen(
                 [str(programs.dtactd), *(word for s in settings for word in ("--set", s))],
                 stdout=out, stderr=subprocess.STDOUT, start_new_session=True)
-        atexit.register(self._process.kill)  # whatever happens here
+        atexit.register(self._process.kill)  # also after an exception
         self.pid = self._process.pid
         until = time.monotonic() + 120
         while not (found := re.search(r"listening on 127\.0\.0\.1:(\d+)", self.log())):
@@ -100,7 +100,7 @@ class Daemon:
         return self.log_file.read_text(encoding="utf-8", errors="replace")
 
     def descriptors(self) -> list[str]:
-        """What each is, sorted; numbers of sockets and pipes left out."""
+        """Targets of the open descriptors, sorted; without the numbers of sockets and pipes."""
         names = []
         folder = pathlib.Path(f"/proc/{self.pid}/fd")
         for number in os.listdir(folder):
@@ -116,7 +116,7 @@ class Daemon:
         times = pathlib.Path(f"/proc/{self.pid}/stat").read_text().rsplit(")", 1)[1].split()
         files = [f for f in self.state.rglob("*") if f.is_file()]
         descriptors = len(self.descriptors())
-        heap = self._heap()  # last: the daemon lets go of this connection a moment later
+        heap = self._heap()  # last: the daemon closes this connection a moment later
         return Held(descriptors, int(fields["Threads"]),
                     int(fields["VmRSS"].split()[0]), int(fields["RssAnon"].split()[0]),
                     heap["used"] + heap["mapped"], heap["kept"],
@@ -125,7 +125,7 @@ class Daemon:
                     self.log_file.stat().st_size / 1024)
 
     def _heap(self) -> dict[str, int]:
-        """Of the daemon's metrics: kind → kB."""
+        """Heap sizes from the daemon's metrics: kind → kB."""
         with urllib.request.urlopen(f"http://127.0.0.1:{self._metrics}/metrics", timeout=120) as answer:
             text = answer.read().decode()
         return {kind: int(float(value)) // 1024 for kind, value in

@@ -1,11 +1,11 @@
-"""What a soak does and when, from one seed: the scene, its scripted faults, and the commands.
+"""The plan of a soak, made from one seed: the scene, its scripted faults, and the commands.
 
-The run is cut into episodes of the scene's loop. Times are the camera's sequence numbers, which go on
+The run is cut into episodes of the scene's loop. Times are the camera's sequence numbers. These go on
 while it is unplugged and when the machine is too busy to make every frame, so that nothing here
 depends on how fast the machine is.
 
     0 s        3 s    5 s     5.5 s    8.5 s  10.5 s   11 s     13 s       14.5 s     16 s
-    untouched  A is held      untouched B is held      untouched visitors  no condition
+    no contact A is held     no contact B is held    no contact visitors no flag
     (undo at 6 s)                                                leave; rest is left
 """
 from __future__ import annotations
@@ -17,22 +17,22 @@ FPS = 60
 EPISODE_S = 16
 EPISODE = EPISODE_S * FPS
 
-# Seconds of the episode. Held a little longer than they are judged.
+# Seconds of the episode. Objects are held a little longer than they are judged.
 HOLD_A, HOLD_B = (3.0, 5.0), (8.5, 10.5)
 EDGE_S = 0.2
-#: While nothing has touched for long enough that the gel is flat and the contact told as lost.
-UNTOUCHED = (1.5, 2.4)
+#: Without contact for long enough that the gel is flat and the end of contact reported.
+NO_CONTACT = (1.5, 2.4)
 VISITORS_LEAVE, REST = 13.0, 13.5
-#: By now whatever happened in the episode has been cleared.
+#: All health flags of the episode are cleared by now.
 CLEARED = (14.5, 16.0)
 
-#: What a busy machine raises by itself: frames that the simulated camera could not make in time, and
-#: threads that did not get their turn or no real-time scheduling. Counted, and no fault; frames_lost and
-#: camera_fault are held against the frames that came (checks.py).
+#: Flags that a busy machine raises by itself: frames that the simulated camera could not make in time, and
+#: threads that did not run in time or without real-time scheduling. Counted, not faults; frames_lost and
+#: camera_fault are compared with the frames that came (checks.py).
 MACHINE = frozenset({"frames_lost", "camera_slow", "camera_fault", "not_realtime"})
 #: Faults under which frames do not come.
 SWALLOWING = frozenset({"unplug", "stall", "hang", "drop", "truncate"})
-#: The daemon tells of lost frames for so long.
+#: The daemon reports lost frames for this long.
 LOST_NS = 1_000_000_000
 # A camera that comes back, and light that changes, are followed by a new reference image.
 BEGUN_ANEW = frozenset({"starting", "light_unsettled", "reference_stale", "reference_restored"})
@@ -44,8 +44,8 @@ class Step:
 
     sequence: int
     verb: str  #: a method of commander.Commander
-    #: The episode is not judged when the answer comes later than this frame. The first step is not even
-    #: begun after it.
+    #: The episode is not judged when the answer comes later than this frame. The first step does not
+    #: even begin after it.
     latest: int
     value: int | bool | None = None
 
@@ -56,10 +56,10 @@ class Episode:
     kind: str
     faults: list[tuple[str, int, int]] = field(default_factory=list)  #: kind, frame, frames
     steps: list[Step] = field(default_factory=list)
-    must: frozenset[str] = frozenset()  #: conditions that have to be told,
-    may: frozenset[str] = frozenset()  #: and that may
+    must: frozenset[str] = frozenset()  #: health flags that have to be reported,
+    may: frozenset[str] = frozenset()  #: and those that may
     events: frozenset[str] = frozenset()  #: kinds of events that have to come
-    blind: tuple[int, int] | None = None  #: frames in which the depth is asked to be wrong
+    blind: tuple[int, int] | None = None  #: frames whose depth is wrong on request
 
     @property
     def first(self) -> int:
@@ -72,40 +72,40 @@ class Episode:
         return self.at(span[0] + edge) <= sequence < self.at(span[1] - edge)
 
     def place(self, sequence: int) -> str | None:
-        """Where the truth is known and still: "A", "B", "untouched" or None."""
+        """Where the truth is known and still: "A", "B", "no_contact" or None."""
         if self.blind and self.blind[0] <= sequence < self.blind[1]:
             return None
         if self.within(sequence, HOLD_A, EDGE_S):
             return "A"
         if self.within(sequence, HOLD_B, EDGE_S):
             return "B"
-        if self.within(sequence, UNTOUCHED) or self.within(sequence, CLEARED):
-            return "untouched"
+        if self.within(sequence, NO_CONTACT) or self.within(sequence, CLEARED):
+            return "no_contact"
         return None
 
 
 # ------------------------------------------------------------ the kinds of episodes
 
-_EARLY = 0.5  # untouched
-_TOUCHED = 3.3  # A is held
-_UNDO, _UNDONE = 6.0, 7.5  # untouched again
+_EARLY = 0.5  # no contact
+_CONTACT = 3.3  # A is held
+_UNDO, _UNDONE = 6.0, 7.5  # no contact again
 
 
-def _camera(kind, condition, *, in_contact=False, frames=(20, 100), may=BEGUN_ANEW):
+def _camera(kind, flag, *, in_contact=False, frames=(20, 100), may=BEGUN_ANEW):
     def make(episode, rng):
-        at = episode.at((_TOUCHED if in_contact else _EARLY) + rng.uniform(0, 0.4))
+        at = episode.at((_CONTACT if in_contact else _EARLY) + rng.uniform(0, 0.4))
         episode.faults.append((kind, at, rng.randint(*frames)))
-        episode.must = frozenset({condition})
+        episode.must = frozenset({flag})
         episode.may = may
     return make
 
 
 def _light(*, in_contact=False, dark=False):
     def make(episode, rng):
-        at = episode.at(_TOUCHED if in_contact else _EARLY)
+        at = episode.at(_CONTACT if in_contact else _EARLY)
         level = 0 if dark else rng.randint(110, 235)
-        until = episode.at(HOLD_A[1] if in_contact else 1.4 if dark else UNTOUCHED[1])
-        undo, undone = (1.5, UNTOUCHED[1]) if dark else (_UNDO, _UNDONE)
+        until = episode.at(HOLD_A[1] if in_contact else 1.4 if dark else NO_CONTACT[1])
+        undo, undone = (1.5, NO_CONTACT[1]) if dark else (_UNDO, _UNDONE)
         episode.steps = [Step(at, "light", until, level),
                          Step(episode.at(undo), "light", episode.at(undone), 255)]
         episode.must = frozenset({"light_unsettled"} | ({"reference_stale"} if in_contact else set()))
@@ -120,22 +120,22 @@ def _rezero(episode, _rng):
 
 
 def _rezero_in_contact(episode, _rng):
-    episode.steps = [Step(episode.at(_TOUCHED), "rezero_refused", episode.at(HOLD_A[1]))]
+    episode.steps = [Step(episode.at(_CONTACT), "rezero_refused", episode.at(HOLD_A[1]))]
 
 
 def _rezero_forced(episode, _rng):
-    """The pressed picture is taken for untouched, as was asked, until the next one is."""
-    episode.steps = [Step(episode.at(_TOUCHED), "rezero", episode.at(HOLD_A[1]), True),
+    """The reference is taken of the pressed picture, as requested, until the next one."""
+    episode.steps = [Step(episode.at(_CONTACT), "rezero", episode.at(HOLD_A[1]), True),
                      Step(episode.at(_UNDO), "rezero", episode.at(_UNDONE), True)]
     episode.events = frozenset({"reference"})
-    episode.blind = (episode.at(_TOUCHED - 0.1), episode.at(HOLD_B[0]))
+    episode.blind = (episode.at(_CONTACT - 0.1), episode.at(HOLD_B[0]))
     episode.may = BEGUN_ANEW | {"light_drifted", "beyond_calibration", "camera_shifted",
                                 "exposure_unlocked"}
 
 
 def _calibration(*, in_contact=False):
     def make(episode, _rng):
-        at = (_TOUCHED, HOLD_B[0] + 0.3) if in_contact else (_EARLY, _UNDO)
+        at = (_CONTACT, HOLD_B[0] + 0.3) if in_contact else (_EARLY, _UNDO)
         episode.steps = [Step(episode.at(at[0]), "upload", episode.at(REST)),
                          Step(episode.at(at[1]), "activate", episode.at(REST), 0)]
         episode.events = frozenset({"calibration"})
@@ -157,7 +157,7 @@ KINDS = {
     "unplug_long": _camera("unplug", "camera_fault", frames=(300, 330)),
     "stall": _camera("stall", "camera_fault"),
     "stall_in_contact": _camera("stall", "camera_fault", in_contact=True, frames=(20, 60)),
-    # Shorter than LOST_NS: the frame behind it has to tell.
+    # Shorter than LOST_NS: the frame after it has to report.
     "hang": _camera("hang", "frames_lost", frames=(20, 45)),
     "drop": _camera("drop", "frames_lost", in_contact=True, frames=(1, 5)),
     "truncate": _camera("truncate", "frames_lost", in_contact=True, frames=(1, 5)),
@@ -173,12 +173,12 @@ KINDS = {
     "calibration_in_contact": _calibration(in_contact=True),
     "calibration_broken": _calibration_broken,
 }
-#: For a run that has time for two.
+#: Kinds for a run that has time for two.
 SHORT = ["unplug_in_contact", "light"]
 
 
 def episodes(seed: int, count: int, kinds: list[str] | None = None) -> list[Episode]:
-    """The first starts up in peace; then every kind once, in an order of its own, again and again."""
+    """The first starts up without faults; then every kind once, in a random order, again and again."""
     rng = random.Random(f"episodes {seed}")
     order: list[str] = ["quiet"]
     while len(order) < count:
@@ -196,7 +196,7 @@ def episodes(seed: int, count: int, kinds: list[str] | None = None) -> list[Epis
 # ------------------------------------------------------------ the scene
 
 def scene(seed: int, plan: list[Episode]) -> tuple[str, dict[str, str]]:
-    """The scene file's text, and what A and B are, in words."""
+    """The scene file's text, and descriptions of A and B."""
     rng = random.Random(f"scene {seed}")
 
     def press(name, text, down, hold, deepest):

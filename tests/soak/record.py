@@ -9,7 +9,7 @@ from daemon import Held
 
 @dataclass(frozen=True)
 class Arrived:
-    """A frame: nanoseconds of the daemon's clock, and the conditions it tells."""
+    """A frame: nanoseconds of the daemon's clock, and its health flags."""
 
     sequence: int
     taken: int
@@ -25,7 +25,7 @@ class Struck:
     frame: int
     frames: int
     before: Arrived | None = None
-    came: int = 0  #: although they could not
+    came: int = 0  #: swallowed frames that came nevertheless
     after: Arrived | None = None
 
     def take(self, frame: Arrived):
@@ -39,23 +39,23 @@ class Struck:
 
 @dataclass
 class Seen:
-    """Of one episode."""
+    """Observations of one episode."""
 
     episode: plan.Episode
     frames: int = 0
-    conditions: set[str] = field(default_factory=set)
+    flags: set[str] = field(default_factory=set)
     events: set[str] = field(default_factory=set)
     cleared: list[Arrived] = field(default_factory=list)  #: the frames of the episode's last seconds,
-    left: set[str] = field(default_factory=set)  #: and the conditions in them
+    left: set[str] = field(default_factory=set)  #: and the health flags in them
     struck: list[Struck] = field(default_factory=list)
-    lost_unseen: int = 0  #: frames that tell of lost ones, and none is missing
-    late: bool = False  #: a command came too late for what it was to meet
+    lost_unseen: int = 0  #: frames that report lost ones although none is missing
+    late: bool = False  #: a command came too late for the episode
     answer_s: float = 0.0  #: the longest that a command waited for its answer
     client_ms: list[float] = field(default_factory=list)
     daemon_ms: list[float] = field(default_factory=list)
-    #: Of frames against which nothing speaks: place, inside, outside, untrusted.
+    #: Frames without a health flag: place, inside, outside, untrusted.
     depths: list[tuple[str, float, float, float]] = field(default_factory=list)
-    reported: int = 0  #: judged frames that said themselves what speaks against them
+    reported: int = 0  #: frames with a health flag, not judged
 
 
 @dataclass
@@ -65,11 +65,11 @@ class Rest:
     held: Held
     descriptors: list[str]
     load: float  #: the machine's, 1 minute
-    late_s: float = 0.0  #: of the camera, after plan.REST
+    late_s: float = 0.0  #: delay of the rest after plan.REST
 
 
 class Record:
-    """Collects what the clients tell."""
+    """Collects the clients' reports."""
 
     def __init__(self, episodes: list[plan.Episode]):
         self.seen = [Seen(episode, struck=[Struck(*fault) for fault in episode.faults
@@ -82,7 +82,7 @@ class Record:
         self.log = ""
         self.ended = 0  #: the daemon's exit status
         self.seconds = 0.0
-        self.states: list[tuple[int, tuple[str, ...]]] = []  #: since when, ns, and the conditions
+        self.states: list[tuple[int, tuple[str, ...]]] = []  #: since when, ns, and the health flags
         self._last = (-1, -1)  # sequence and stamp
         self._gap_ns = -1  # when the frame after the last gap was published
 
@@ -122,7 +122,7 @@ class Record:
             if "frames_lost" in health and taken - self._gap_ns >= plan.LOST_NS:
                 seen.lost_unseen += 1
             seen.frames += 1
-            seen.conditions.update(health)
+            seen.flags.update(health)
             seen.client_ms.append((received - ready) / 1e6)
             seen.daemon_ms.append((published - ready) / 1e6)
             if seen.episode.within(sequence, plan.CLEARED):
@@ -146,4 +146,4 @@ class Record:
             return
         seen.events.add(kind)
         if kind == "state":
-            seen.conditions.update(event.health)
+            seen.flags.update(event.health)

@@ -27,11 +27,11 @@ def write(folder: pathlib.Path, record: Record, verdicts: list[Verdict], words: 
     lines += [f"| {v.check} | {v.measured} | {v.limit} | {v.word} |" for v in verdicts]
     if plots:
         lines += ["", f"![Memory, descriptors, threads, latency, frames, depth]({plots})"]
-    lines += ["", "| episode | times | frames a second | conditions told |", "| --- | --- | --- | --- |"]
+    lines += ["", "| episode | times | frames a second | health flags |", "| --- | --- | --- | --- |"]
     for kind in plan.KINDS:
         of = [s for s in record.seen if s.episode.kind == kind]
         if of:
-            reported = sorted(set().union(*(s.conditions for s in of)))
+            reported = sorted(set().union(*(s.flags for s in of)))
             rate = statistics.mean(s.frames for s in of) / plan.EPISODE_S
             lines.append(f"| {kind} | {len(of)} | {rate:.1f} | {', '.join(reported)} |")
     (folder / "report.md").write_text("\n".join(lines) + "\n", encoding="utf-8")
@@ -45,11 +45,11 @@ def _csv(file, record):
                         "daemon_p99_ms", "error_A_mm", "error_B_mm", "error_no_contact_mm",
                         "descriptors", "threads", "resident_kib", "anonymous_kib", "heap_kib",
                         "kept_kib", "cpu_s", "state_kib", "log_kib", "load", "rest_late_s",
-                        "answer_s", "late", "conditions"])
+                        "answer_s", "late", "flags"])
         for s in record.seen:
             rest = rests.get(s.episode.index)
             held = rest.held if rest else None
-            errors = [[d[2 if place == "untouched" else 1] for d in s.depths if d[0] == place]
+            errors = [[d[2 if place == "no_contact" else 1] for d in s.depths if d[0] == place]
                       for place in MAX_ERROR_MM]
             worst = [f"{max(of):.4f}" if of else "" for of in errors]
             table.writerow([s.episode.index, s.episode.kind, s.frames,
@@ -59,7 +59,7 @@ def _csv(file, record):
                                        held.anonymous_kib, held.heap_kib, held.kept_kib, held.cpu_s,
                                        held.state_kib, held.log_kib, rest.load,
                                        f"{rest.late_s:.2f}"] if held else [""] * 11),
-                            f"{s.answer_s:.3f}", int(s.late), " ".join(sorted(s.conditions))])
+                            f"{s.answer_s:.3f}", int(s.late), " ".join(sorted(s.flags))])
 
 
 def _plots(folder, record):
@@ -96,7 +96,7 @@ def _plots(folder, record):
     frames.plot(minutes, [s.frames / plan.EPISODE_S for s in seen], "o-", ms=3)
     frames.set_ylabel("frames a second")
     for place, most in MAX_ERROR_MM.items():
-        which = 2 if place == "untouched" else 1
+        which = 2 if place == "no_contact" else 1
         points = [(m, d[which]) for m, s in zip(minutes, seen) for d in s.depths if d[0] == place]
         line, = depth.plot([p[0] for p in points], [p[1] for p in points], ".", ms=4, label=place)
         depth.axhline(most, color=line.get_color(), lw=0.7, ls=":")
@@ -119,7 +119,7 @@ def _minutes(episode, seconds):
 
 
 def _mark(axis, seen, named):
-    """Ticks along the top, where something was done to the daemon."""
+    """Ticks along the top, where the soak acted on the daemon."""
     groups = {"camera's fault": ("C3", [f[1] for s in seen for f in s.episode.faults]),
               "command": ("C4", [t.sequence for s in seen for t in s.episode.steps])}
     for label, (color, at) in groups.items():

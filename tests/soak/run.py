@@ -29,12 +29,12 @@ except ImportError as problem:
     print(f"soak: {problem}: apt-get install python3-numpy python3-protobuf python3-zstandard")
     sys.exit(77)
 
-#: The honest client, the judge and the commander are there all the time.
+#: The honest client, the judge and the commander, which are always connected.
 RESIDENTS = 3
 
 
 def alone(target, *arguments):
-    """A client's process: Ctrl-C is for the one that started it, which ends them all in order."""
+    """A client's process: Ctrl-C is for its parent, which ends all of them in order."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     target(*arguments)
@@ -51,7 +51,7 @@ class Soak:
         text, self.words = plan.scene(seed, episodes)
         scene = folder / "scene.toml"
         scene.write_text(text)
-        still = {"A": plan.HOLD_A, "B": plan.HOLD_B, "untouched": plan.UNTOUCHED}
+        still = {"A": plan.HOLD_A, "B": plan.HOLD_B, "no_contact": plan.NO_CONTACT}
         size = run(programs.truth, scene, *(f"{folder / name}.truth:{round(sum(span) / 2 * plan.FPS)}"
                                             for name, span in still.items()))
         truths = clients.truth_maps(folder, *map(int, size.split()))
@@ -81,7 +81,7 @@ class Soak:
                 return
 
     def wait(self, done):
-        """Until `done()`; listens meanwhile. RuntimeError when nothing moves any more."""
+        """Waits until `done()`; reads messages meanwhile. RuntimeError when nothing moves any more."""
         moved, at = time.monotonic(), self.commander.sequence
         while not done():
             self.commander.listen(0.05)
@@ -102,7 +102,7 @@ class Soak:
         seen = self.record.seen[episode.index]
         for step in episode.steps:
             self.wait(self.reached(step.sequence))
-            # The episode before has not come to rest in time: what is not begun is not to be undone.
+            # The previous episode has not come to rest in time: a step that did not begin is not undone.
             if step is episode.steps[0] and not self.commander.in_time(step):
                 seen.late = True
                 break
@@ -114,7 +114,7 @@ class Soak:
         self.wait(self.reached(episode.at(plan.REST)))
         until = time.monotonic() + clients.TIMEOUT_S
         self.wait(lambda: self._inside.value == 0 or time.monotonic() > until)
-        # Whoever was reset is noticed by the daemon a moment later.
+        # The daemon notices a reset a moment later.
         self.wait(lambda: len(self.commander.status().message.clients) == RESIDENTS
                   or time.monotonic() > until)
         if time.monotonic() > until:

@@ -1,6 +1,6 @@
-// soak_truth SCENE FILE:FRAME...: the simulator's own indentation at some frames of a scene, which
-// the code under test has no part in. Each FILE gets the camera's pixels row by row: float32
-// millimetres of all (positive = pressed), then a byte of each, 255 where the object touches.
+// soak_truth SCENE FILE:FRAME...: the simulator's own indentation at some frames of a scene,
+// independent of the code under test. Each FILE gets the camera's pixels row by row: float32
+// millimetres of all (positive = pressed), then a byte of each, 255 in contact.
 // Prints the image's width and height.
 #include "hal/sim/truth.hpp"
 

@@ -1,4 +1,4 @@
-// Where the page draws the axes of the object in contact. PAGE_NODE as in decoders_test.mjs.
+// Position of the axes of the object in contact on the page. PAGE_NODE as in decoders_test.mjs.
 import assert from "node:assert/strict";
 import path from "node:path";
 import test from "node:test";
@@ -16,9 +16,9 @@ function axes() {
   return kept;
 }
 
-// centreMm is the centre now, behind the motion: turning and shifting it again would draw the axes off
+// centreMm is the centre after the motion: moving it again would draw the axes off
 // the object.
-test("the axes lie at the pose's centre, turned as the object", () => {
+test("the axes are at the pose's centre, turned as the object", () => {
   const shown = axes();
   placeAxes(shown, {
     valid: true,

@@ -1,4 +1,4 @@
-// Chromium with the page in it, and what the tests read there.
+// Chromium with the page in it, and helpers that read the page.
 import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
 import { createRequire } from "node:module";
@@ -17,7 +17,7 @@ const axe = readFileSync(
 export const DESKTOP = { width: 1440, height: 900 };
 export const PHONE = { width: 390, height: 844 };
 
-// No network of its own, and a folder of its own for what it keeps.
+// No network except loopback, and a temporary profile.
 const SWITCHES = [
   "--headless",
   "--no-sandbox",
@@ -42,9 +42,9 @@ export async function open(gateway, { viewport = DESKTOP, dark = true, before = 
   const complaints = [];
   page.on("pageerror", (error) => complaints.push(error.stack ?? String(error)));
   page.on("console", (message) => {
-    // The software renderer remarks on being read from.
+    // The software renderer warns when its pixels are read.
     if (/GPU stall due to ReadPixels/.test(message.text())) return;
-    // A daemon or a gateway that is away is what some tests are about.
+    // Some tests are about a daemon or a gateway that is away.
     if (/ERR_CONNECTION_REFUSED|WebSocket connection to/.test(message.text())) return;
     if (["error", "warning"].includes(message.type())) complaints.push(message.text());
   });

@@ -1,4 +1,4 @@
-// What the page commands: light, re-zero, calibrations, how depth is made, and for whom it does not.
+// Commands of the page: light, re-zero, calibrations, reconstruction, and clients without the right to them.
 import assert from "node:assert/strict";
 import path from "node:path";
 import { after, before, test } from "node:test";
@@ -10,7 +10,7 @@ let view;
 let pane;
 
 before(async () => {
-  // A list that is made from the known ball alone comes without those for sharpened levels.
+  // A LUT from the known ball alone comes without LUTs for sharpened levels.
   left = await startDaemon("left", 0, [`calibration=${calibration("list")}`]);
   view = await open(await startGateway({ left: left.port }));
   pane = view.page.locator('[data-sensor="left"]');
@@ -82,7 +82,7 @@ test("depth is made as the panel says, and its worth and time are on the chart",
     (text) => text === "125 × 100, quarter",
   );
   await until(reported, (text) => text.startsWith("quarter: "));
-  // Which way is the faster here is the machine's to say; the chart orders them by what it tells.
+  // The faster variant depends on the machine; the chart orders them by the measured time.
   const dots = await panel.locator("circle").evaluateAll((circles) =>
     circles.map((circle) => ({
       right: Number(circle.getAttribute("cx")),

@@ -1,5 +1,5 @@
 // The page's decoders against the wire's golden vectors: PAGE_NODE is the folder of the bundles that
-// prepare.sh makes of its sources, GOLDEN that of the vectors, RANDOM_MAPS that of random_maps.py's.
+// prepare.sh makes of its sources, GOLDEN that of the vectors, RANDOM_MAPS that of random_maps.py.
 import assert from "node:assert/strict";
 import { readFileSync, readdirSync } from "node:fs";
 import path from "node:path";
@@ -43,7 +43,7 @@ for (const name of names) {
       }
     });
     test(`${name}: ${key} of a smaller or larger map is refused`, () => {
-      // By two rows: the nibble that fills a byte up may be taken for one more value of 0.
+      // By two rows: the nibble that fills a byte up may count as one more value of 0.
       assert.throws(() => decoded(encoding, bytes(key), width, height + 2));
       if (height > 2) assert.throws(() => decoded(encoding, bytes(key), width, height - 2));
     });

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # decoders_test.sh PAGE GOLDEN FOLDER: the page's decoders against the wire's golden vectors and random
-# maps, and where it draws a pose's axes, under node.
+# maps, and the positions of a pose's axes, under node.
 set -euo pipefail
 here=$(cd "$(dirname "$0")" && pwd)
 "$here/prepare.sh" "$1" "$3"

@@ -1,6 +1,6 @@
-// What the page costs: memory that must not grow, and the main thread's time for a frame, which is
-// measured and told, not judged: a machine without a graphics card draws in software. WEB_SECONDS (12)
-// is how long, WEB_FPS how many frames a second the daemon makes.
+// The page's cost: memory that must not grow, and the main thread's time for a frame, which is
+// measured and printed, not judged: a machine without a graphics card draws in software. WEB_SECONDS (12)
+// is the duration, WEB_FPS the daemon's frame rate.
 import assert from "node:assert/strict";
 import { readFileSync, writeFileSync } from "node:fs";
 import path from "node:path";
@@ -21,12 +21,12 @@ function mainThread(trace) {
       (event) =>
         event.pid === thread.pid && event.tid === thread.tid && event.name === "FireAnimationFrame",
     );
-  // Of the renderers' main threads the one that draws.
+  // The main thread of the renderer that draws.
   const thread = named.sort((a, b) => frames(b).length - frames(a).length)[0];
   const mine = trace.filter(
     (event) => event.pid === thread.pid && event.tid === thread.tid && event.ph === "X",
   );
-  // Of tasks that lie inside of each other the outer one counts.
+  // Of nested tasks the outer one counts.
   const tasks = mine.filter((event) => /RunTask$/.test(event.name)).sort((a, b) => a.ts - b.ts);
   let [busyUs, takenUs, end] = [0, 0, 0];
   for (const task of tasks) {

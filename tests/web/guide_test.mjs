@@ -1,5 +1,5 @@
-// The guided calibration on the page: dtact-calibrate, which the gateway runs, on a sensor that a ball of 4 mm
-// is pressed into again and again.
+// The guided calibration on the page: the gateway runs dtact-calibrate on a sensor that a ball of 4 mm
+// is pressed into repeatedly.
 import assert from "node:assert/strict";
 import { readdirSync } from "node:fs";
 import path from "node:path";
@@ -48,18 +48,18 @@ function lastWord(page, first, token = "") {
 test("presses become a calibration that the daemon uses", async () => {
   await pane.getByRole("button", { name: "Calibrate…" }).click();
   const guide = view.page.getByRole("dialog", { name: "Guided calibration" });
-  // As the calibration in use has them.
+  // The values of the calibration in use.
   assert.equal(await guide.getByLabel("Millimetres per pixel").inputValue(), "0.0413793");
   assert.equal(await guide.getByLabel("Map's width, pixels").inputValue(), "500");
   assert.equal(await guide.getByLabel("Map's height, pixels").inputValue(), "400");
-  // Wider than high, so that an order which is confused shows.
+  // Wider than high, so that swapped axes show.
   await guide.getByLabel("Map's width, pixels").fill("560");
   await guide.getByLabel("Map's height, pixels").fill("520");
   await guide.getByRole("button", { name: "Begin" }).click();
   const said = guide.getByLabel("Said", { exact: true });
   const done = /the daemon uses calibration left-\d{8}-\d{6} from now on/;
   let refused;
-  // It asks again where a press was taken already.
+  // The session asks again at a place with a press.
   const end = Date.now() + 300_000;
   while (Date.now() < end && !done.test(await said.textContent())) {
     const answer = guide.getByRole("button", { name: /^(take the press|take the images|yes)$/ });

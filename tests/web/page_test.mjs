@@ -1,4 +1,4 @@
-// The page in a browser, on simulated sensors: what it shows against what the daemon sent.
+// The page in a browser, on simulated sensors: the shown values against the daemon's messages.
 import assert from "node:assert/strict";
 import { readFile } from "node:fs/promises";
 import path from "node:path";
@@ -36,7 +36,7 @@ after(async () => {
   await stopAll();
 });
 
-// Also after a test that failed half-way.
+// Runs after failed tests as well.
 beforeEach(async () => {
   if (await pane.getByRole("button", { name: "Resume" }).isVisible()) await resume(pane);
 });
@@ -69,7 +69,7 @@ async function pausedWith(sensor, other, accepted) {
 async function pausedAt(deepestMm) {
   const near = (mm) => Math.abs(mm - deepestMm) < 0.08;
   await until(() => numberOf(pane, "deepest"), near);
-  // It may just have been let go: then the next one of that depth is taken.
+  // The press may just have ended: then the next one of that depth is used.
   return pausedWith(pane, tap, async () => near(await numberOf(pane, "deepest")));
 }
 
@@ -112,7 +112,7 @@ test("the ball is at its place and depth, within the map's step of the frame", a
   assert.equal(picture.height, MAP.height);
   assertEqual(picture, frame);
   const ball = pressed(picture, frame.mmPerPx);
-  // The scene's own numbers; how true the depth is, is tested elsewhere.
+  // The scene's own numbers; other tests check the accuracy of depth.
   assert.ok(Math.hypot(ball.x - 3.0, ball.y + 2.0) < 0.1, `at ${ball.x}, ${ball.y}`);
   assert.ok(Math.abs(ball.deepest - 1.0) < 0.08, `${ball.deepest} mm deep`);
   await resume(pane);
@@ -377,7 +377,7 @@ test("a snapshot of the surface is the newest map, not what was shown before", a
   await pane.getByRole("radio", { name: "Depth" }).click();
 });
 
-test("a daemon that dies is told at once, and the page goes on when it is back", async () => {
+test("the page reports a dead daemon at once and continues when it is back", async () => {
   const { port } = left;
   await left.stop("SIGKILL");
   await until(
@@ -390,7 +390,7 @@ test("a daemon that dies is told at once, and the page goes on when it is back",
   assert.ok(await controls(), "nothing can be commanded meanwhile");
   assert.ok((await pane.locator(".side").first().evaluate((side) => getComputedStyle(side).opacity)) < 1);
   const before = Number(await pane.getAttribute("data-sequence"));
-  // One that is opened meanwhile finds no list of calibrations.
+  // A page that is opened meanwhile finds no list of calibrations.
   const early = await open(gateway);
   const earlyPane = early.page.locator('[data-sensor="left"]');
   const calibrations = earlyPane.locator('[aria-label="Calibrations"]');
@@ -577,7 +577,7 @@ test("on a desktop picture, numbers and plots are seen at once", async () => {
   await view.page.screenshot({ path: path.join(work, "desktop.png") });
 });
 
-test("a browser without WebGL 2 is told so", async () => {
+test("a browser without WebGL 2 gets a message", async () => {
   const withoutWebGl = await open(gateway, {
     before: () => {
       const plain = HTMLCanvasElement.prototype.getContext;

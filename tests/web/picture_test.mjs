@@ -1,4 +1,4 @@
-// The page as README shows it: an M4 nut on the simulated sensor, with depth along a line. The picture
+// The page in the state that README shows: an M4 nut on the simulated sensor, with depth along a line. The picture
 // stays in FOLDER/run-picture-*/page.png.
 import assert from "node:assert/strict";
 import { statSync } from "node:fs";
@@ -35,7 +35,7 @@ test("picture, numbers, profile and plots on one screen", async () => {
       () => numberOf(pane, "centroid"),
       (x) => Math.abs(x + 4) < 0.1,
     );
-    // Pressed to its depth, and the plots have seen it.
+    // Wait until it is pressed to its depth and the plots show it.
     await new Promise((done) => setTimeout(done, 900));
     const file = path.join(work, "page.png");
     await view.page.screenshot({ path: file });

@@ -12,7 +12,7 @@ let pane;
 
 before(async () => {
   daemon = await startDaemon("left");
-  // Only for a port that is free.
+  // Started and stopped only to get a free port.
   const perceive = await startPerceive(daemon.port);
   port = perceive.port;
   await perceive.stop();
@@ -31,7 +31,7 @@ const drawn = () =>
     const copy = document.createElement("canvas");
     [copy.width, copy.height] = [canvas.width, canvas.height];
     const context = copy.getContext("2d");
-    // What was drawn stays only until the browser has shown it.
+    // The drawing stays only until the browser has shown it.
     return new Promise((done) =>
       requestAnimationFrame(() => {
         context.drawImage(canvas, 0, 0);
@@ -85,7 +85,7 @@ test("points are drawn during contact, and none else", async () => {
   await until(drawn, ({ pixels }) => pixels === 0);
 });
 
-test("motion is told, and nothing can be commanded that dtact-perceive does not know", async () => {
+test("motion is shown, and only commands of dtact-perceive are offered", async () => {
   await until(
     () => fact(pane, "moved").textContent(),
     (text) => /mm/.test(text),

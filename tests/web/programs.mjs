@@ -1,6 +1,6 @@
 // The programs that the tests run, on the simulated sensor: DTACTD, DTACTCTL, DTACT_WEB, DTACT_PERCEIVE,
-// CALIBRATE and SIM_RENDER name them; FOLDER is for what they write. PAGE_DIST may name a folder with a page that is
-// to be tried in place of the one built into the gateway.
+// CALIBRATE and SIM_RENDER name them; FOLDER is for their output. PAGE_DIST may name a folder with a page
+// to test in place of the one built into the gateway.
 import { execFileSync, spawn } from "node:child_process";
 import { existsSync, mkdirSync, mkdtempSync, rmSync, statSync, writeFileSync } from "node:fs";
 import http from "node:http";

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""random_maps.py GOLDEN FOLDER: random maps as files like those of the folder GOLDEN, by its make.py."""
+"""random_maps.py GOLDEN FOLDER: random maps as files like those of the folder GOLDEN, with its make.py."""
 import importlib.util
 import pathlib
 import random
@@ -18,7 +18,7 @@ def load(file):
 
 
 def kinds(some):
-    """What a pixel may be: anything, extremes, small steps, a few among zeros."""
+    """Kinds of pixel values: anything, extremes, small steps, a few among zeros."""
     yield "any", lambda: some.randint(-32768, 32767)
     yield "extreme", lambda: some.choice((-32768, 32767, 0))
     yield "small", lambda: some.randint(-2, 2)

@@ -1,5 +1,5 @@
-// A recording made in the browser, read by the command-line tools and held against what another client
-// of the daemon received.
+// A recording made in the browser, read by the command-line tools and compared with the frames of another client
+// of the daemon.
 import assert from "node:assert/strict";
 import { execFileSync } from "node:child_process";
 import { readFileSync } from "node:fs";
@@ -18,7 +18,7 @@ let pane;
 before(async () => {
   daemon = await startDaemon("left");
   tap = new Tap(daemon.port);
-  // Twice the same one: a page keeps one pane at least.
+  // The same sensor twice: a page keeps at least one pane.
   view = await open(await startGateway({ left: daemon.port, other: daemon.port }));
   await choose("other");
   pane = view.page.locator('[data-sensor="left"]');
@@ -34,7 +34,7 @@ after(async () => {
   await stopAll();
 });
 
-// Of the packages that the page is built with.
+// A package that the page is built with.
 const { McapStreamReader } = createRequire(path.resolve(process.env.FOLDER, "page/package.json"))(
   "@mcap/core",
 );
@@ -101,7 +101,7 @@ async function record(ended) {
 test("what is recorded is what the daemon sent", async () => {
   let sent = [];
   const file = await record(async () => {
-    // While the other client still has them.
+    // Read while the other client still has them.
     sent = tap.sequences().map((sequence) => ({ sequence, ...tap.frame(sequence) }));
     await pane.getByRole("button", { name: "Stop" }).click();
   });
@@ -149,7 +149,7 @@ test("depth can be made anew from it", async () => {
   assert.equal(maps(remade), maps(recorded));
 });
 
-test("a pane that is closed hands over what it has recorded", async () => {
+test("a closed pane downloads its recording", async () => {
   await choose("other");
   const file = await record(() => choose("left"));
   assert.ok(framesOf(file).length > 20);

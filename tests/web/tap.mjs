@@ -1,5 +1,5 @@
-// A client of the daemon that shares nothing with the page: it keeps the last frames as the daemon
-// made them, in DEPTH_INT16, read from the bytes by proto/README.md and dtact.proto's field numbers.
+// A client of the daemon that is independent of the page: it keeps the last frames that the daemon
+// made, in DEPTH_INT16, parsed after proto/README.md and dtact.proto's field numbers.
 import net from "node:net";
 
 const KEPT = 100;

@@ -58,7 +58,7 @@ std::string all(std::vector<Job>& jobs, int threads) {
       "group,row,title,unit,undecidable,method,value,inside_mm,outside_mm,along_mm,stated_mm,"
       "withheld,"
       "flagged,"
-      "conditions\n";
+      "health_flags\n";
   for (const Job& job : jobs) {
     if (job.failure) std::rethrow_exception(job.failure);
     csv += job.line;

@@ -46,13 +46,13 @@ double nominal_mm() {
 
 struct Case {
   std::string_view id;
-  double harmless;  ///< Within twice the nominal error, and nothing is said.
-  double broken;    ///< Beyond it, or no depth, and it is said.
+  double harmless;  ///< Within twice the nominal error, without a flag.
+  double broken;    ///< Beyond it, or no depth, and reported.
 };
 
-class Condition : public ::testing::TestWithParam<Case> {};
+class Disturbance : public ::testing::TestWithParam<Case> {};
 
-TEST_P(Condition, IsReportedWhereItBreaksAndNotBefore) {
+TEST_P(Disturbance, IsReportedWhereItBreaksAndNotBefore) {
   const Outcome harmless = at(GetParam().id, GetParam().harmless);
   EXPECT_LT(harmless.error_mm(), 2 * nominal_mm());
   EXPECT_EQ(harmless.flagged, 0) << health_flags_of(harmless);
@@ -62,7 +62,7 @@ TEST_P(Condition, IsReportedWhereItBreaksAndNotBefore) {
 }
 
 INSTANTIATE_TEST_SUITE_P(
-    Atlas, Condition,
+    Atlas, Disturbance,
     ::testing::Values(Case{"brightness_down", 0.998, 0.96}, Case{"brightness_up", 1.002, 1.02},
                       Case{"dead_leds", 0, 1}, Case{"colour", 0.002, 0.1}, Case{"shift", 0.3, 10},
                       Case{"shift_rezero", 0.3, 10}, Case{"saturation", 1.2, 1.8},
@@ -84,7 +84,7 @@ TEST(Atlas, CleanScenesAreNotFlagged) {
 }
 
 TEST(Atlas, FaintLastingPressIsNotAbsorbed) {
-  // Half a minute; the limit on what drift may take is one grey level, 0.03 mm.
+  // Half a minute; drift may take at most one grey level, 0.03 mm.
   const Outcome outcome = at("faint", 0.1);
   EXPECT_LT(outcome.inside_mm, 0.035);
 }
@@ -98,18 +98,18 @@ TEST(Atlas, DriftIsFollowedAndWhatIsNotIsReported) {
 }
 
 TEST(Atlas, AFlatPressOfTheWholeFieldIsNotFollowed) {
-  // Half a minute, in which the rate would allow 1 % of the light, or 0.05 mm.
+  // Half a minute, in which the rate allows 1 % of the light, or 0.05 mm.
   const Outcome pressed = at("flat", 0.1);
   EXPECT_TRUE(pressed.reported());
   EXPECT_LT(pressed.error_mm(), 0.025);
 }
 
 TEST(Atlas, ReferenceUnderAPressIsReportedFromAFifthOfAMillimetreOn) {
-  EXPECT_TRUE(at("touched", 0.2).reported());
-  EXPECT_LT(at("touched", 0.1).error_mm(), 2 * nominal_mm());
+  EXPECT_TRUE(at("contact_at_start", 0.2).reported());
+  EXPECT_LT(at("contact_at_start", 0.1).error_mm(), 2 * nominal_mm());
 }
 
-/// Frames, of two seconds, that were said to be of an exposure that runs automatically.
+/// Number of frames, of two seconds, that are flagged for automatic exposure.
 int followed(Script script) {
   script.frames = kPress + 120;
   script.judged = script.frames;
@@ -117,8 +117,8 @@ int followed(Script script) {
   return outcome.health_flags.at(static_cast<std::size_t>(pipeline::Health::exposure_unlocked));
 }
 
-/// The left third loses half of its light, which an exposure with a time constant of a fifth of a
-/// second makes up for with a `share` of what keeps the mean.
+/// The left third loses half of its light. An exposure with a time constant of a fifth of a second
+/// compensates `share` of the change of the mean.
 Script covered(double share) {
   return press(ball_truth(), share, [](Shot& shot, int n, double part) {
     shot.moment = 0;
@@ -134,7 +134,7 @@ TEST(Atlas, AnExposureThatKeepsTheMeanIsNamed) {
   EXPECT_EQ(followed(covered(0)), 0);
 }
 
-// The gel bulges round a press, by a few levels; light changes during contact.
+// The gel bulges around a press, by a few levels; light changes during contact.
 TEST(Atlas, NothingElseIsTakenForAnExposureThatFollows) {
   for (const char* id : {"deep", "full_field", "texture", "walls", "bulge", "brightness_up",
                          "exposure_drift", "leak"}) {
@@ -145,8 +145,8 @@ TEST(Atlas, NothingElseIsTakenForAnExposureThatFollows) {
   }
 }
 
-// What the page calls undecidable: two causes, one image. Differences are those of frames with the
-// same noise, in grey levels, of which noise of a single pixel is 1.0.
+// The page calls these undecidable: two causes, one image. Differences are those of frames with the
+// same noise, in grey levels; the noise of a single pixel is 1.0.
 double greatest_difference(Spoiler& a, const Shot& shot_a, Spoiler& b, const Shot& shot_b,
                            double reach_mm) {
   const hal::LumaView first = a.make(shot_a, 1);
@@ -268,8 +268,8 @@ TEST(Undecidable, ADefocusedBallLooksLikeABlunterObject) {
 }
 
 TEST(Undecidable, SteepWallsLookLikeSlopingOnes) {
-  // A cube 0.8 mm deep, and one whose walls rise over 0.4 mm instead of at once. At the wall they
-  // differ by a quarter of a millimetre, in the image by one of 25 levels.
+  // A cube 0.8 mm deep, and one whose walls rise over 0.4 mm instead of vertically. At the wall
+  // they differ by a quarter of a millimetre, in the image by one of 25 levels.
   const hal::sim::Object sloping{"sloping", 4.7, [](double x, double y) {
                                    const double r = std::max(std::abs(x), std::abs(y));
                                    return r <= 3.3 ? std::max(0.0, (r - 2.9) * 0.8 / 0.4)
@@ -295,7 +295,7 @@ TEST(Undecidable, FullFieldPressLooksLikeDimmedLight) {
   press.moment = moment_of(0);
   Shot dim;
   dim.exposure = 1 - hal::sim::response(truth->scene().optics, 0.5);
-  // 0.5 mm darkens by 16 levels; what is left between the two causes is a tenth of one.
+  // 0.5 mm darkens by 16 levels; the two causes differ by a tenth of one.
   EXPECT_GT(greatest_difference(dimmed, {}, pressed, press, 8), 14);
   EXPECT_LT(greatest_difference(dimmed, dim, pressed, press, 8), 0.4);
 }

@@ -14,27 +14,27 @@
 
 namespace dtact::atlas {
 
-/// How one frame is made, and what is wrong with it. Default: a clean frame.
+/// Disturbances of one frame. Default: a clean frame.
 struct Shot {
   std::uint64_t moment = 0;  ///< Frame of the solved choreography.
-  hal::Light light;          ///< What the ring really shows.
+  hal::Light light;          ///< Light that the ring really emits.
   double exposure = 1;       ///< Factor on the light, clipped at 255.
   double covered = 0;        ///< Share of its light that the left third loses.
   double leak = 0;         ///< Grey levels added at the left edge, falling to a tenth at the right.
   double band = 0;         ///< Amplitude of PWM banding, share of the light.
   double band_rows = 90;   ///< Its period: 400 Hz in a rolling shutter of 600 rows at 60 fps.
-  double shift_px = 0;     ///< The image moves so far to the right and down.
-  double turn_deg = 0;     ///< About its centre.
+  double shift_px = 0;     ///< Shift of the image to the right and down.
+  double turn_deg = 0;     ///< Rotation about the centre.
   double blur_px = 0;      ///< Standard deviation.
-  double noise = 1;        ///< Factor.
+  double noise = 1;        ///< Factor on the noise.
   int jpeg = 0;            ///< Quality 1 … 95; 0: not compressed.
   int dust = 0;            ///< Specks of 0.4 mm that take 30 % of the light, at fixed places.
   int dead_pixels = 0;     ///< Black, at fixed places.
-  double stale_share = 0;  ///< Lower share of the picture that is the frame before's.
+  double stale_share = 0;  ///< Lower share of the picture that repeats the previous frame.
   bool damaged = false;    ///< The payload is truncated: no frame.
 };
 
-/// Where in the camera's picture of a still sensor the pixel (x, y) of a moved camera's lies.
+/// The place in the picture of a still camera that a moved camera's pixel (x, y) shows.
 struct Place {
   double x = 0;
   double y = 0;
@@ -44,7 +44,7 @@ struct Place {
   return shot.shift_px != 0 || shot.turn_deg != 0;
 }
 
-/// Makes frames of a solved scene and spoils them. One thread.
+/// Makes frames of a solved scene with disturbances. One thread.
 class Spoiler {
  public:
   Spoiler(const std::shared_ptr<const hal::sim::Truth>& truth, std::uint64_t seed);

@@ -66,7 +66,7 @@ std::vector<Row> light_rows() {
        ""},
       {"light",
        "exposure_drift",
-       "exposure or gain drifts by so much within a second",
+       "exposure or gain drifts within a second",
        "share of the light",
        {0, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2},
        on_ball([](Shot& shot, int n, double drift) {

@@ -32,7 +32,7 @@ class Run:
         self.along = number(line["along_mm"])  # with the truth moved along with the picture
         self.reported = number(line["flagged"]) >= 0.5 or number(line["withheld"]) >= 0.5
         self.stated = number(line["stated_mm"])
-        self.health_flags = line["conditions"].replace("_", " ")
+        self.health_flags = line["health_flags"].replace("_", " ")
 
 
 def read(path):
@@ -47,26 +47,26 @@ def read(path):
 
 
 def wrong(runs, nominal):
-    """Where the error is beyond twice the nominal one, or there is no depth."""
+    """Points with more than twice the nominal error, or without depth."""
     return [r for r in runs if r.error > 2 * nominal or math.isnan(r.error)]
 
 
-def untold(runs, nominal):
+def unreported(runs, nominal):
     return [r for r in wrong(runs, nominal) if not r.reported]
 
 
 def silent(runs, nominal):
-    """Neither a condition nor the stated uncertainty says it."""
-    return [r for r in untold(runs, nominal) if r.error > 2 * r.stated]
+    """Points that neither a flag nor the stated uncertainty covers."""
+    return [r for r in unreported(runs, nominal) if r.error > 2 * r.stated]
 
 
 def verdict(runs, nominal):
-    """Where the error leaves twice the nominal one, and what was said there."""
+    """The value where the error leaves twice the nominal one, and the report there."""
     bad = wrong(runs, nominal)
     if not bad:
         return "stays within", "–"
     first = bad[0]
-    said = first.health_flags or ("no depth given" if first.reported else "no condition")
+    said = first.health_flags or ("no depth given" if first.reported else "no flag")
     if not first.reported:
         said += f", stated uncertainty {first.stated:.3f} mm"
     if quiet := silent(runs, nominal):
@@ -78,12 +78,12 @@ def verdict(runs, nominal):
 
 
 def table_without_gain(rows, methods, nominal):
-    """The worst point of each row that no condition tells, our methods only."""
-    lines = ["| condition | method | worst without a condition | error / stated | truth moved along |",
+    """The worst point of each row without a flag, our methods only."""
+    lines = ["| disturbance | method | worst without a flag | error / stated | truth moved along |",
              "| --- | --- | --- | --- | --- |"]
     for row in rows.values():
         for method in methods:
-            points = untold(row["runs"][method], nominal[method])
+            points = unreported(row["runs"][method], nominal[method])
             if not points:
                 continue
             worst = max(points, key=lambda r: r.error / r.stated)
@@ -142,7 +142,7 @@ def main():
     for group in GROUPS:
         draw(group, rows, methods, nominal, arguments.folder)
         parts.append(f"## {group.capitalize()}\n\n![{group}]({group}.png)\n")
-        parts.append("| condition | method | leaves 2 × nominal at | what was said then |")
+        parts.append("| disturbance | method | leaves 2 × nominal at | reported then |")
         parts.append("| --- | --- | --- | --- |")
         for row in rows.values():
             if row["line"]["group"] != group:
@@ -152,11 +152,11 @@ def main():
                 parts.append(f"| {row['line']['title']} ({row['line']['unit']}) | {method} | {where} | {said} |")
         for row in rows.values():
             if row["line"]["group"] == group and row["line"]["undecidable"]:
-                parts.append(f"\n*{row['line']['title']}* cannot be told from one luma image: "
+                parts.append(f"\n*{row['line']['title']}* cannot be recognised in one luma image: "
                              f"{row['line']['undecidable']}.")
         parts.append("")
     text = text.replace("@NOMINAL@", ", ".join(f"{nominal[m]:.3f} mm ({m})" for m in methods))
-    for place, which in (("@SILENT@", silent), ("@UNTOLD@", untold)):
+    for place, which in (("@SILENT@", silent), ("@UNREPORTED@", unreported)):
         counts = {m: sum(bool(which(row["runs"][m], nominal[m])) for row in rows.values()) for m in ours}
         text = text.replace(place, ", ".join(f"{counts[m]} of {len(rows)} rows ({m})" for m in ours))
     text = text.replace("@TABLE@", table_without_gain(rows, ours, nominal))

@@ -9,7 +9,7 @@ namespace {
 constexpr int kSlowFps = 10;
 const std::vector<double> kDrifts = {0, 0.5, 1, 2, 3, 5};
 
-/// From kReady on the light falls by 1 % a minute to so many percent less; a ball presses for two
+/// From kReady on the light falls by 1 % a minute to a total of `percent`; a ball presses for two
 /// of every six seconds, and at the end.
 Script drifting(double percent, bool follow) {
   Script script;
@@ -55,8 +55,8 @@ std::vector<Row> reference_rows() {
        },
        ""},
       {"reference",
-       "touched",
-       "reference taken at start while touched",
+       "contact_at_start",
+       "reference taken at start in contact",
        "depth, mm",
        {0, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0},
        [](double depth) {

@@ -8,7 +8,7 @@
 
 namespace dtact::atlas {
 
-/// One condition, swept from harmless to broken.
+/// One disturbance, swept from harmless to broken.
 struct Row {
   std::string_view group;  ///< light, image, scene or reference: its picture.
   std::string_view id;     ///< Names its lines in the CSV.
@@ -16,7 +16,7 @@ struct Row {
   std::string_view unit;       ///< Unit of the swept value.
   std::vector<double> values;  ///< The first is harmless; its error is nominal.
   std::function<Script(double)> script;
-  /// Why one luma image cannot show this condition; empty where it can. See the page.
+  /// The reason why one luma image cannot show this disturbance; empty where it can. See the page.
   std::string_view undecidable;
 };
 
@@ -27,7 +27,7 @@ struct Row {
 [[nodiscard]] std::vector<Row> scene_rows();
 [[nodiscard]] std::vector<Row> reference_rows();
 
-/// Scenes in which nothing is wrong: whatever is flagged there is flagged falsely.
+/// Scenes without a disturbance: every flag in them is false.
 [[nodiscard]] std::vector<Script> clean_scripts();
 
 }  // namespace dtact::atlas

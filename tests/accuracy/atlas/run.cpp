@@ -21,7 +21,7 @@ std::uint64_t true_moment(const Script& script, int n) {
   return script.moment ? script.moment(n) : script.shot(n).moment;
 }
 
-/// Adds up what the loop made of the judged frames.
+/// Adds up the loop's results of the judged frames.
 class Judge {
  public:
   explicit Judge(const Script& script) : script_(script) {}
@@ -86,7 +86,7 @@ class Judge {
     return errors;
   }
 
-  /// To the nearest pixel; beyond the crop its edge stands, outside the contact.
+  /// Rounded to the nearest pixel; beyond the crop its edge is repeated, outside the contact.
   static table::TruePress moved_along(const table::TruePress& truth, const Shot& shot) {
     table::TruePress moved;
     for (int y = 0; y < table::kCrop; ++y) {
@@ -122,7 +122,7 @@ class Judge {
   int depths_ = 0;
 };
 
-/// Between two frames it hands the one before to the judge; its clock is the loop's.
+/// Between two frames it passes the previous one to the judge; its clock is the loop's.
 class ScriptedCamera final : public hal::Camera, private hal::FrameOwner {
  public:
   ScriptedCamera(const Script& script, fakes::FakeClock& clock)
@@ -146,7 +146,7 @@ class ScriptedCamera final : public hal::Camera, private hal::FrameOwner {
 
   [[nodiscard]] hal::GrabStatus grab(hal::Frame& out,
                                      std::chrono::nanoseconds /*timeout*/) noexcept override {
-    tracker_->settle();  // what it finds would else come a frame sooner or later
+    tracker_->settle();  // otherwise its result may come a frame sooner or later
     harvest();
     const int n = next_++;
     if (n >= script_.frames) {

@@ -17,17 +17,17 @@
 
 namespace dtact::atlas {
 
-/// One run of the daemon's capture loop before the simulated camera, in its own time.
+/// One run of the daemon's capture loop with the simulated camera, in its own time.
 struct Script {
   std::shared_ptr<const hal::sim::Truth> truth;
-  int frames = 0;             ///< Asked of the camera, damaged ones included.
-  double fps = 60;            ///< Fewer let minutes pass in few frames.
-  bool follow = true;         ///< The reference follows the light, as configured by default.
-  int judged = 12;            ///< Number of last frames judged.
-  std::optional<int> rezero;  ///< The frame before which a new reference is asked for.
-  bool force = true;          ///< It is taken although in contact, as the darkened field seems to.
+  int frames = 0;                 ///< Frames of the camera, including damaged ones.
+  double fps = 60;                ///< A low rate makes minutes pass in few frames.
+  bool follow = true;             ///< The reference follows the light, as configured by default.
+  int judged = 12;                ///< Number of last frames judged.
+  std::optional<int> rezero;      ///< The frame before which a re-zero is requested.
+  bool force = true;              ///< Forced, since a darkened field looks like contact.
   std::function<Shot(int)> shot;  ///< The shot of frame n.
-  /// The moment whose indentation is true at frame n, where it is not the one shown.
+  /// The moment whose indentation is true at frame n, where it is not the shown one.
   std::function<std::uint64_t(int)> moment;
 };
 
@@ -38,12 +38,12 @@ inline constexpr int kReady = 30;
 struct Outcome {
   double inside_mm = 0;   ///< Mean absolute error in contact; NaN: no depth there.
   double outside_mm = 0;  ///< The same elsewhere.
-  /// As error_mm(), with the truth moved along with a picture that the camera's place moves: what
-  /// is left is wrong in depth, not in place. NaN where the camera did not move.
+  /// Like error_mm(), but the truth is moved along with a picture that the camera's shift moves:
+  /// the rest is wrong in depth, not in place. NaN where the camera did not move.
   double along_mm = std::numeric_limits<double>::quiet_NaN();
   double withheld = 0;   ///< Share of the frames without depth, or of the contact marked untrusted.
   double flagged = 0;    ///< Share of the frames that carried a health flag.
-  double stated_mm = 0;  ///< The uncertainty that the frames with depth carried, mean.
+  double stated_mm = 0;  ///< Mean uncertainty of the frames with depth.
   std::array<int, pipeline::kHealthCount> health_flags{};  ///< Frames that carried each.
   int frames = 0;
 

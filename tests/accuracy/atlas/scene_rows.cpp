@@ -6,7 +6,7 @@
 namespace dtact::atlas {
 namespace {
 
-/// The object at the depth or size that is swept, under a clean image.
+/// The object at the swept depth or size, under a clean image.
 std::function<Script(double)> object(const std::function<Pose(double)>& pose) {
   return [pose](double value) { return press(solve({pose(value)}), value, {}); };
 }

@@ -11,7 +11,7 @@ double begin_s(std::size_t pose) { return 1 + 2 * static_cast<double>(pose); }
 
 std::shared_ptr<const hal::sim::Truth> solve(const std::vector<Pose>& poses) {
   hal::sim::Scene scene = hal::sim::default_scene();
-  scene.gel.solve_step_mm = 5;  // only objects at rest are looked at
+  scene.gel.solve_step_mm = 5;  // only objects at rest are judged
   scene.loop_from_s = scene.loop_to_s = 0;
   scene.presses.clear();
   for (std::size_t i = 0; i < poses.size(); ++i) {

@@ -38,7 +38,7 @@ std::function<Script(double)> after_move(const Spoil& move, bool rezero) {
   return [move, rezero](double value) {
     if (rezero) return on_ball(move, true)(value);
     Script script = press(ball_truth(), value, move);
-    constexpr int kSeconds = 60;  // a look at the marks and the pause before it
+    constexpr int kSeconds = 60;  // a check of the marks and the pause before it
     script.fps = 1;
     script.frames += kSeconds;
     script.shot = [value, move](int n) {

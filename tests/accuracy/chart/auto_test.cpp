@@ -18,16 +18,16 @@
 namespace dtact::chart {
 namespace {
 
-/// What a rung of the ladder makes of a frame.
+/// The map that a resolution of the ladder makes of a frame.
 struct Made {
   double bend_um = 0;
   double lut_um = 0;
-  double error_um = 0;  ///< True.
+  double error_um = 0;  ///< True error.
 };
 
-/// One frame of the scripted run, worked by every rung.
+/// One frame of the scripted run, reconstructed at every resolution.
 struct Judged {
-  std::size_t chosen = 0;  ///< Rung.
+  std::size_t chosen = 0;  ///< Index of the resolution.
   std::array<Made, pipeline::Resolutions::kMaxResolutions> by_resolution;
 
   [[nodiscard]] double error_um() const { return by_resolution.at(chosen).error_um; }
@@ -42,8 +42,8 @@ calibration::Calibration from_one_press(const image::Grey16& reference) {
                              .crop = calibration::Crop{kCropCol, kCropRow, kSide, kSide}});
 }
 
-/// All objects one after the other (config/scenes/all_objects.toml), as the capture loop works:
-/// how each frame is made is chosen by the one before.
+/// All objects one after the other (config/scenes/all_objects.toml), processed like in the capture
+/// loop: each frame chooses the resolution of the next.
 std::vector<Judged> scripted_run(const pipeline::ReconstructionRules& rules,
                                  const image::Grey16& reference,
                                  const calibration::Calibration& made) {
@@ -88,7 +88,7 @@ std::vector<Judged> scripted_run(const pipeline::ReconstructionRules& rules,
       reconstructor.run_active(luma.data(), kWidth, resolution.tiles, depth, marks, nullptr, &sums);
       judged.by_resolution.at(resolution_index) = {
           .bend_um = pipeline::bend_um(sums, mm_per_px),
-          // As the capture loop has it: half of the deepest is about the mean over a contact.
+          // The capture loop does the same: half of the deepest is about the mean over a contact.
           .lut_um =
               maps.lut_um(0.0005 * std::max<int>(0, std::ranges::max(depth)), resolution.steps()),
           .error_um = 1000 * error_of(depth, resolution.decimation(), shot).mean_absolute_mm};
@@ -115,7 +115,7 @@ double share(const std::vector<Judged>& run, Predicate predicate) {
          static_cast<double>(run.size());
 }
 
-/// Shares of frames in which the chosen rung and each one alone are within the bound.
+/// Shares of frames in which the chosen resolution and each one alone are within the bound.
 void print_shares(const char* what, double bound_um, const std::vector<Judged>& run,
                   std::size_t resolutions) {
   std::printf("%s, bound %3.0f um: inside %.1f %%; alone and chosen", what, bound_um,
@@ -150,7 +150,7 @@ TEST(Auto, KeepsTheBoundWhereverFullResolutionDoesAndSavesPixels) {
   }
 }
 
-/// The middle of what every frame says.
+/// Median of a value over all frames.
 template <typename Value>
 double median(const std::vector<Judged>& run, Value value) {
   std::vector<double> values;
@@ -173,7 +173,7 @@ TEST(Auto, SharpensWhereTheBoundAsksForItAndNotElsewhere) {
     ASSERT_GT(run.size(), 150U);
     print_shares("sharpening", bound, run, 3);
     if (bound == 30.0) {
-      // What daemon/pipeline/depth/uncertainty.cpp rests on.
+      // daemon/pipeline/depth/uncertainty.cpp relies on this.
       for (int steps = 0; steps <= 2; ++steps) {
         const auto resolution_index = static_cast<std::size_t>(steps);
         const double bends = median(run, [&](const Judged& j) {

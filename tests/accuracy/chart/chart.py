@@ -33,7 +33,7 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402
 
 TITLES = {"ball": "5 mm ball, 1.2 mm deep", "screws": "three set screws, 0.8 mm deep",
-          "flat": "flat disc of 20 mm, 0.25 mm deep", "nothing": "nothing touching"}
+          "flat": "flat disc of 20 mm, 0.25 mm deep", "nothing": "no contact"}
 PAPER = "paper's pipeline, Python"
 COLUMNS = ["shot", "setting", "method", "resolution", "tiles", "smoothing_mm", "median_us",
            "quartile_low_us", "quartile_high_us", "instructions_per_pixel", "error_um",
@@ -60,7 +60,7 @@ class Server:
 
 
 class Paper:
-    """The paper's pipeline on the exported shots, with the list of the published method."""
+    """The paper's pipeline on the exported shots, with the LUT of the published method."""
 
     def __init__(self, folder):
         def read(name, kind):
@@ -139,7 +139,7 @@ def measure(server, paper, shots, settings, rounds):
 
 
 def mark_pareto(rows):
-    """A setting is on the front when none is both quicker and nearer to the truth on its shot."""
+    """A setting is on the front when no other is both faster and more accurate on its shot."""
     for row in rows:
         row["pareto"] = int(not any(
             other["shot"] == row["shot"] and other is not row and
@@ -187,7 +187,7 @@ def draw_points(axes, rows, value, front):
 
 def plot(rows, shots, file, label):
     plt.rcParams.update({"font.family": "DejaVu Sans", "font.size": 8})
-    # A processor that is shared may not let its instructions be counted: no empty row then.
+    # A shared processor may not allow counting instructions: the row is left out then.
     views = [("time per frame, µs", "median_us", False, True),
              ("instructions per pixel of the full map", "instructions_per_pixel", False, False),
              ("time per frame, µs: beside the paper's", "median_us", True, False)]

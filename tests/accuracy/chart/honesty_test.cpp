@@ -1,10 +1,10 @@
-// Whether depth maps match their uncertainty: true error over stated uncertainty. What is stated
-// rests on constants that were taken from simulated scenes: the blur's from all_objects.toml on the
+// Whether depth maps match their uncertainty: true error over stated uncertainty. The uncertainty
+// uses constants from simulated scenes: the blur's from all_objects.toml on the
 // built-in sensor (daemon/pipeline/depth/uncertainty.hpp), the zero's from presses on sensors drawn
-// between those fitted to sensor_a and sensor_b (lut_uncertainty.hpp), those of the list of several
-// presses from gels of 1.5, 2 and 3 mm (chain_fit.cpp, press_set.cpp). None of the gels,
-// lights, seeds, balls and objects here had part in any constant; that the list of several presses
-// counts the ring's light, too, was decided here (95 % were within 2.3 without).
+// between those fitted to sensor_a and sensor_b (lut_uncertainty.hpp), those of the LUT from
+// several presses from gels of 1.5, 2 and 3 mm (chain_fit.cpp, press_set.cpp). None of the gels,
+// lights, seeds, balls and objects here contributed to a constant; except that the LUT from several
+// presses includes the ring's light because of this test (95 % were within 2.3 without).
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -52,7 +52,7 @@ struct Specimen {
   std::size_t light = 0;  ///< Into table::configurations().
   double ball_mm = 0;     ///< Radius.
   double depth_mm = 0;    ///< Depth of the one press.
-  /// The sphere alone cannot chain its presses: the lightest are not seen.
+  /// The sphere alone cannot chain its presses: the lightest are not visible.
   bool leaves_gap = false;
 };
 
@@ -73,7 +73,7 @@ std::vector<Specimen> specimens() {
           {"of another law", table::another_law(), 0, 4.0, 1.4, true}};
 }
 
-/// Seven presses that calibrate where several are taken, 0.55 to 1.15 mm deep, after the first.
+/// Seven presses for methods that need several, 0.55 to 1.15 mm deep, after the first.
 constexpr std::size_t kCalibrating = 8;
 
 std::vector<Press> presses_on(const Specimen& specimen) {
@@ -98,7 +98,7 @@ std::vector<Press> presses_on(const Specimen& specimen) {
   return presses;
 }
 
-/// One after another, at the times that table::first_still_frame() expects.
+/// Solves the presses one after another, at the times that table::first_still_frame() expects.
 std::shared_ptr<const hal::sim::Truth> solve(Scene scene, const std::vector<Press>& presses) {
   scene.gel.solve_step_mm = 5;
   scene.loop_from_s = scene.loop_to_s = 0;
@@ -141,8 +141,8 @@ calibration::Calibration layered(const calibration::BallPresses& set) {
 struct Method {
   const char* name;
   Calibrate calibrate;
-  bool of_all = false;  ///< Presses, not of the first alone.
-  bool chains = false;  ///< From zero upward, and refuses presses that leave a gap.
+  bool of_all = false;  ///< Made from all presses, not from the first only.
+  bool chains = false;  ///< Chains presses from zero upward, and refuses a gap.
 };
 constexpr Method kMethods[] = {
     {"sphere alone, one press",
@@ -160,7 +160,7 @@ constexpr Method kMethods[] = {
     {"ours, one press", [](const calibration::BallPresses& set) { return layered(first_of(set)); }},
     {"ours, several presses", layered, true}};
 
-/// True over stated, of one frame as the daemon works it at full resolution.
+/// True over stated error of one frame at full resolution.
 double ratio(const pipeline::ActiveCalibration& active, const image::Grey8& frame,
              const table::TruePress& truth) {
   const recon::Model& model = *active.image.calibration->model;
@@ -178,7 +178,7 @@ double ratio(const pipeline::ActiveCalibration& active, const image::Grey8& fram
                            recon::TileRows(static_cast<std::size_t>(grid.rows()), grid.all()),
                            depth, drawn, nullptr, &sums);
   const double bend = pipeline::bend_um(sums, model.mm_per_px);
-  // As the capture loop has it: half of the deepest is about the mean over a contact.
+  // The capture loop does the same: half of the deepest is about the mean over a contact.
   const double lut_um = active.maps.lut_um(0.0005 * std::max<int>(0, std::ranges::max(depth)), 0);
   return 1000 * table::against_indentation(depth, truth).mean_mm() /
          pipeline::uncertainty_um(lut_um, bend);
@@ -190,7 +190,7 @@ double share_of(const std::vector<double>& sorted, double share) {
 
 class Honesty : public testing::Test {
  protected:
-  /// For each method, over all specimens, ascending.
+  /// Ratios of each method, over all specimens, ascending.
   static void SetUpTestSuite() {
     for (const Specimen& specimen : specimens()) judge(specimen);
     for (std::vector<double>& ratios : all_) std::ranges::sort(ratios);

@@ -6,8 +6,9 @@
 
 namespace dtact::chart {
 
-/// User-space instructions that `work` takes on this thread, counted by the processor; none where
-/// the system does not let it (/proc/sys/kernel/perf_event_paranoid above 2, or no counter).
+/// User-space instructions that `work` takes on this thread, counted by the processor; nothing
+/// where the system does not allow it (/proc/sys/kernel/perf_event_paranoid above 2, or no
+/// counter).
 [[nodiscard]] std::optional<std::uint64_t> count_instructions(const std::function<void()>& work);
 
 }  // namespace dtact::chart

@@ -61,7 +61,7 @@ Shot shoot(const std::string& name, const std::string& press_toml, int frames) {
 }
 
 image::Grey16 make_reference() {
-  const hal::sim::Scene scene = hal::sim::parse_scene("", "untouched");
+  const hal::sim::Scene scene = hal::sim::parse_scene("", "no contact");
   hal::sim::Renderer renderer(scene, kSeed + 1);
   std::vector<std::uint32_t> sum(std::size_t{kWidth} * kHeight);
   for (std::uint64_t i = 0; i < kReferenceFrames; ++i) {

@@ -7,8 +7,8 @@
 #include "hal/files/png.hpp"
 #include "hal/sim/renderer.hpp"
 
-/// What the chart measures on: the built-in simulated sensor (hal/sim), its truth never shown to
-/// the methods. Depth is asked for on the paper's crop: 580×580 of 800×600 pixels, 24×24 mm.
+/// The chart's scenes: the built-in simulated sensor (hal/sim), whose truth the methods never see.
+/// Depth is measured on the paper's crop: 580×580 of 800×600 pixels, 24×24 mm.
 namespace dtact::chart {
 
 inline constexpr int kWidth = 800;   ///< Pixels of a frame.
@@ -18,7 +18,7 @@ inline constexpr int kCropCol = (kWidth - kSide) / 2;
 inline constexpr int kCropRow = (kHeight - kSide) / 2;
 inline constexpr double kMmPerPx = 0.0413793;
 
-/// Something at rest on the sensor.
+/// An object at rest on the sensor.
 struct Shot {
   std::string name;                  ///< "ball", "screws", "flat", "nothing".
   std::vector<image::Grey8> frames;  ///< The same moment; only the noise differs.
@@ -27,17 +27,17 @@ struct Shot {
   std::vector<std::uint8_t> judged;
 };
 
-/// What is true of one frame, without frames.
+/// The truth of one frame, without frames.
 [[nodiscard]] Shot truth_of(const hal::sim::Renderer& renderer, std::uint64_t sequence);
 
 /// The sensor without contact: the mean of many frames, Q8.
 [[nodiscard]] image::Grey16 make_reference();
 
-/// A ball of 4 mm radius pressed 1.3 mm deep near the centre: what calibrates.
+/// The press that calibrates: a ball of 4 mm radius, 1.3 mm deep near the centre.
 [[nodiscard]] Shot make_calibration_press();
 
-/// The same ball at eleven places, 0.4 to 1.4 mm deep: what calibrates where several presses are
-/// taken.
+/// The presses for methods that need several: the same ball at eleven places, 0.4 to 1.4 mm
+/// deep.
 [[nodiscard]] std::vector<Shot> make_calibration_presses();
 
 /// A ball of 5 mm radius 1.2 mm deep, three set screws 0.8 mm deep, a flat disc that covers most of

@@ -1,12 +1,12 @@
-// Works one setting on one shot on command, so that a driver can alternate between all of them
+// Runs one setting on one shot on command, so that a driver can alternate between all of them
 // and the Python pipeline.
 //   list                  the settings, tab separated: NAME|METHOD|DECIMATION|TILES|SMOOTHING_MM
 //   shots                 the shots' names, tab separated
-//   use SHOT|NAME         makes ready; the next verbs are about it
+//   use SHOT|NAME         selects both for the next verbs
 //   error                 mean absolute error in mm, share of untrusted pixels
 //   run COUNT             two unmeasured frames, then COUNT times, nanoseconds of CPU a frame
 //   instructions          user instructions a frame, or "none"
-//   export FOLDER         what the Python pipeline reads
+//   export FOLDER         writes the Python pipeline's input
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -35,7 +35,7 @@ void write_raw(const std::string& file, const std::vector<T>& values) {
   if (!out.flush()) throw std::runtime_error("cannot write " + file);
 }
 
-/// The published method's list for whole grey levels 0 … 255, millimetres.
+/// The published method's LUT for whole grey levels 0 … 255, millimetres.
 std::vector<float> published_lut_mm(const std::vector<Setting>& settings) {
   const auto it = std::ranges::find(settings, "published", &Setting::method);
   const dtact::recon::DepthLut& lut = it->model->lut;
@@ -120,7 +120,7 @@ std::string answer(Lab& lab, const std::string& verb, const std::string& rest) {
     return out;
   }
   if (verb == "instructions") {
-    constexpr int kFrames = 8;  // all of a shot's
+    constexpr int kFrames = 8;  // of a shot
     for (int i = 0; i < kFrames; ++i) lab.worker->once();
     const auto count = count_instructions([&] {
       for (int i = 0; i < kFrames; ++i) lab.worker->once();

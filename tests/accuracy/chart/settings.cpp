@@ -27,7 +27,7 @@ std::shared_ptr<const recon::Model> calibrate(const image::Grey16& reference, co
       .model;
 }
 
-/// A map's value at a place between its pixels; none where one of the four is untrusted.
+/// A map's value between its pixels; nothing where one of the four is untrusted.
 std::optional<double> bilinear(const std::vector<std::int16_t>& map, int width, int height,
                                double x, double y) {
   x = std::clamp(x, 0.0, width - 1.0);
@@ -147,7 +147,7 @@ void Worker::once() {
 }
 
 Error Worker::error() {
-  // The look for what changed has seen a few frames, as it has in a running daemon.
+  // The activity check has seen a few frames, as in a running daemon.
   for (std::size_t i = 0; i < frames_.size(); ++i) once();
   Error mean;
   for (std::size_t i = 0; i < frames_.size(); ++i) {

@@ -18,16 +18,16 @@ struct Setting {
   std::string name;    ///< "list full tiles 0.10", unique.
   std::string method;  ///< "published", "regression", "list", "several", "ours", "virtual balls".
   int decimation = 1;  ///< 1, 2 or 4.
-  bool tiles = false;  ///< Only what changed.
+  bool tiles = false;  ///< Only the active tiles.
   double smoothing_mm = 0.1;  ///< Standard deviation; 0: the method's own.
   std::shared_ptr<const recon::Model> model;
   int steps = 0;  ///< Sharpening steps.
 };
 
-/// All of them, calibrated with make_calibration_press() or, "regression" and "several", with
-/// make_calibration_presses(), "virtual balls" as with_luts_of_virtual_balls() says, and nothing
-/// else. "list" and "several" are of the known sphere alone, "ours" is what dtact-calibrate makes
-/// of the one press by default.
+/// All settings, calibrated with make_calibration_press(); "regression" and "several" with
+/// make_calibration_presses(); "virtual balls" as with_luts_of_virtual_balls() says. "list" and
+/// "several" use the known sphere only, "ours" is dtact-calibrate's default for the one
+/// press.
 [[nodiscard]] std::vector<Setting> make_settings(const image::Grey16& reference);
 
 struct Error {
@@ -35,15 +35,15 @@ struct Error {
   double untrusted_share = 0;   ///< Share of the judged pixels.
 };
 
-/// What a list of several presses is made from: the calibration presses of a 4 mm ball.
+/// The presses of a 4 mm ball from which the LUT of "several" is made.
 [[nodiscard]] calibration::BallPresses several_presses(const image::Grey16& reference);
 
-/// Of one map at 1/decimation of the crop's resolution, against the truth at every pixel of the
-/// crop: a coarser map is read bilinearly.
+/// Error of one map at 1/decimation of the crop's resolution against the truth at every pixel of
+/// the crop: a coarser map is read bilinearly.
 [[nodiscard]] Error error_of(const std::vector<std::int16_t>& depth_um, int decimation,
                              const Shot& shot);
 
-/// A setting at work on one shot, frame after frame.
+/// Runs a setting on one shot, frame after frame.
 class Worker {
  public:
   Worker(const Setting& setting, const image::Grey16& reference, const Shot& shot);

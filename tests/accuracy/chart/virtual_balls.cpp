@@ -38,7 +38,7 @@ std::vector<Shot> virtual_presses() {
   return shots;
 }
 
-/// Levels themselves in the place of depth: a list that says Q6.
+/// A LUT that returns levels in Q6 in place of depth.
 recon::DepthLut levels_lut() {
   recon::DepthLut lut{
       .first_q6 = -kReach_q6, .um = {}, .covered_from_q6 = -kReach_q6, .covered_to_q6 = kReach_q6};
@@ -96,7 +96,7 @@ recon::DepthLut list_of(std::vector<Pair> pairs) {
       mean.q6 += it->q6 / static_cast<double>(to - from);
       mean.um += it->um / static_cast<double>(to - from);
     }
-    // What lies beside zero is noise, and zero is known.
+    // Depths beside zero are noise, and zero is known.
     if (to - from >= kMin && std::abs(mean.q6) > recon::kEntriesPerLevel) nodes.push_back(mean);
     from = to;
   }

@@ -1,7 +1,7 @@
-// The normal force that a client gets, calibrated as a user would by the simulated sensor, a ball
-// and a kitchen scale, against the force that the simulator's own solution presses with, on objects
-// that had no part in it. Frames pass camera, capture loop and frame encoder. The seed had no part
-// in the choice of any constant.
+// The normal force that a client gets, calibrated as a user would with the simulated sensor, a ball
+// and a kitchen scale. It is compared with the force of the simulator's own solution, on objects
+// that were not used to calibrate. Frames pass camera, capture loop and frame encoder. No constant
+// was chosen with this seed.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 

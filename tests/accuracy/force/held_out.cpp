@@ -28,10 +28,10 @@ namespace sim = hal::sim;
 
 constexpr std::uint64_t kContactFree = 60;  // frames, which the reference takes 45 of
 constexpr std::uint64_t kPeriod = 30;       // frames from one press to the next
-constexpr std::uint64_t kStill = 14;        // the frame after a press's begin that is looked at
+constexpr std::uint64_t kStill = 14;        // the judged frame after a press's begin
 constexpr double kFps = 60;
 
-/// The same draws with every library.
+/// Random numbers that are the same with every standard library.
 class Draw {
  public:
   explicit Draw(std::uint64_t seed) : random_(seed) {}
@@ -86,7 +86,7 @@ Drawn draw_object(Draw& draw) {
 
 sim::Scene empty_scene(double thickness_mm) {
   sim::Scene scene = thickness::sensor_of(thickness_mm);
-  scene.gel.solve_step_mm = 5;  // only the presses at rest are looked at
+  scene.gel.solve_step_mm = 5;  // only presses at rest are judged
   scene.loop_from_s = scene.loop_to_s = 0;
   scene.presses.clear();
   return scene;
@@ -130,7 +130,7 @@ std::string make_calibration(double thickness_mm, Calibrating calibrating, std::
                              const fs::path& folder) {
   constexpr double kNewtonsPerGram = 0.00980665;
   sim::Scene scene = empty_scene(thickness_mm);
-  // No deeper than half of the ball's radius.
+  // The ball goes no deeper than half of its radius.
   const double deepest = std::min(0.85 * thickness_mm, 1.9);
   add_press(scene, sim::ball(4), {.x_mm = 0.4, .y_mm = -0.3, .depth_mm = deepest});
   for (int i = 0; i < 11; ++i) {

@@ -9,13 +9,13 @@
 
 namespace dtact::force {
 
-/// What calibrates the force, each pressed with loads from light to heavy near the middle.
+/// Objects for the calibration, each pressed with loads from light to heavy near the middle.
 enum class Calibrating : std::uint8_t {
   ball,              ///< A ball of 4 mm radius, 11 loads.
-  ball_and_flat_end  ///< And a disc of 2 mm radius, 5 loads.
+  ball_and_flat_end  ///< The ball, and a disc of 2 mm radius, 5 loads.
 };
 
-/// One press of an object that had no part in the calibration, and the force that a client got.
+/// One press of an object that was not used in the calibration, and the force that a client got.
 struct HeldOut {
   std::string object;
   double thickness_mm = 0;  ///< Gel thickness.
@@ -29,22 +29,22 @@ struct HeldOut {
 };
 
 struct Trial {
-  std::string calibration;  ///< What dtact-calibrate force printed last.
+  std::string calibration;  ///< Last output of dtact-calibrate force.
   std::vector<HeldOut> presses;
 };
 
-/// Calibrates depth and force of the simulated sensor, whose gel has this thickness, by
-/// dtact-calibrate with PNG files of its camera in `folder`, then presses `count` objects of kinds,
+/// Calibrates depth and force of the simulated sensor, whose gel has this thickness, with
+/// dtact-calibrate from PNG files of its camera in `folder`. Then presses `count` objects of kinds,
 /// sizes, places, rotations, tilts and depths drawn by `seed`, through camera, capture loop and
 /// frame encoder.
 [[nodiscard]] Trial try_held_out(double thickness_mm, Calibrating calibrating, std::uint64_t seed,
                                  int count, const std::filesystem::path& folder,
                                  int sharpen_steps = 0);
 
-/// The error over the stated one.
+/// True error over stated error.
 [[nodiscard]] double ratio(const HeldOut& press);
 
-/// The value below which `share` of them lie.
+/// The value below which `share` of the values are.
 [[nodiscard]] double quantile(std::vector<double> values, double share);
 
 }  // namespace dtact::force

@@ -1,4 +1,4 @@
-// held_out_forces [SEED] [COUNT] [ball|flat] [SHARPEN]: the force of objects that had no part in
+// held_out_forces [SEED] [COUNT] [ball|flat] [SHARPEN]: the force on objects that were not used in
 // its calibration, on gels of 1.5 to 3 mm, as CSV; the distribution on standard error.
 #include <fmt/format.h>
 

@@ -1,5 +1,6 @@
-// One press of a 4 mm ball, by the gel's model: a 5 mm ball on gels and optics that nothing was
-// tuned on. Seeds other than those of README's table. The whole study: model_study.
+// One press of a 4 mm ball, fitted with the gel's model; judged on a 5 mm ball, on gels and optics
+// that nothing was tuned on. Seeds other than those of README's table. The whole study:
+// model_study.
 #include <gtest/gtest.h>
 
 #include <algorithm>

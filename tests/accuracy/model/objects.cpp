@@ -41,7 +41,7 @@ double rms_mm(std::span<const std::int16_t> depth_um) {
   return 0.001 * std::sqrt(sum / static_cast<double>(depth_um.size()));
 }
 
-/// The frame in the middle of what a press holds.
+/// A frame in the middle of the time for which a press is held.
 std::uint64_t held(const hal::sim::Scene& scene, const hal::sim::Press& press) {
   const double middle = 0.5 * (press.keys.at(1).time_s + press.keys.at(2).time_s);
   return static_cast<std::uint64_t>(std::lround(middle * scene.camera.fps));
@@ -122,7 +122,7 @@ std::string to_markdown(const std::vector<ObjectErrors>& errors, int seeds,
     row(names[i], [i](const ObjectErrors& each) { return each.object_mm(i); });
   }
   row("mean over all objects", [](const ObjectErrors& each) { return each.mean_mm(); });
-  row("untouched, root mean square",
+  row("no contact, root mean square",
       [](const ObjectErrors& each) { return mean(each.no_contact_mm); });
   const auto refused = [](int sum, const ObjectErrors& each) { return sum + each.refused; };
   return out + fmt::format(

@@ -9,24 +9,24 @@
 
 namespace dtact::model_study {
 
-/// Errors of one method of the paper's table on objects, a value each seed, mm.
+/// Errors of one method of the paper's table on objects, a value per seed, mm.
 struct ObjectErrors {
   /// By object: mean absolute error against the simulator's indentation in contact.
   std::vector<std::vector<double>> in_contact_mm;
   std::vector<double> no_contact_mm;  ///< Root mean square of one frame's map.
-  int refused = 0;                    ///< Seeds whose press was not taken.
+  int refused = 0;                    ///< Seeds whose press was refused.
 
   [[nodiscard]] double object_mm(std::size_t object) const;  ///< Mean over the seeds.
-  [[nodiscard]] double mean_mm() const;                      ///< And over the objects.
+  [[nodiscard]] double mean_mm() const;                      ///< Mean over seeds and objects.
 };
 
-/// config/scenes/all_objects.toml's objects, each as it is held.
+/// The objects of config/scenes/all_objects.toml, in the order in which they are held.
 [[nodiscard]] std::vector<std::string> object_names();
-/// Every method of the paper's table, calibrated for each of the seeds 1 … `seeds` as the table
-/// does it, on a sensor of the law.
+/// Calibrates every method of the paper's table for each of the seeds 1 … `seeds`, like the table,
+/// on a sensor of the law, and measures objects.
 [[nodiscard]] std::vector<ObjectErrors> read_objects(int seeds,
                                                      table::Law law = table::Law::built_in);
-/// The table, Markdown; `sensor` says in a word or two what was pressed.
+/// The table, Markdown; `sensor` names the sensor in a word or two.
 [[nodiscard]] std::string to_markdown(const std::vector<ObjectErrors>& errors, int seeds,
                                       const std::string& sensor);
 

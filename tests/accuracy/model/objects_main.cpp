@@ -1,4 +1,4 @@
-// Prints objects of many shapes as every method of the paper's table reads them, or writes the
+// Prints the errors of every method of the paper's table on objects of many shapes, or writes the
 // page.
 #include <fmt/format.h>
 

@@ -1,5 +1,5 @@
-// What the model makes of a real ball press, beside the free LUT: the gel, and where the
-// distance from the sphere comes from. With --simulated the same on simulated sensors, where the
+// The model's fit of a real ball press, beside the free LUT: the gel, and the causes of the
+// distance from the sphere. With --simulated the same on simulated sensors, where the
 // truth is known too.
 #include <fmt/format.h>
 
@@ -29,8 +29,8 @@ using namespace dtact;
 using calibration::SymmetricPress;
 using DepthOf = std::function<double(double level)>;
 
-/// Mean distance from the sphere over a contact, the median taken off: of all of it, of its mean on
-/// rings, and of what is left on each ring.
+/// Mean distance from the sphere over a contact, without the median: of all of it, of its mean on
+/// rings, and of the rest on each ring.
 struct Distance {
   double all = 0;
   double along = 0;
@@ -77,7 +77,7 @@ Distance from_sphere(const SymmetricPress& press, const DepthOf& depth_of,
   return {mean_distance(errors), mean_distance(along), mean_distance(round)};
 }
 
-/// The indentation that the fitted press itself has where it is so dark: no LUT could do better.
+/// The fitted press's own indentation at this darkening: no LUT could do better.
 DepthOf own_press(const calibration::ModelFit& fit, double ball_radius_mm,
                   const calibration::MapOptics& optics) {
   using calibration::RadialTransform;
@@ -154,7 +154,7 @@ void look(const SymmetricPress& press, const calibration::MapOptics& optics) {
              calibration::depth_spread_mm(press, optics, fit));
 }
 
-/// The press as it is, and about its middle without its gain.
+/// Evaluates the press as it is, and about its middle without its gain.
 void look(const recon::Model& model, const image::Grey16& reference_q8,
           const std::vector<image::Grey8>& frames) {
   const auto press = calibration::settle(model, reference_q8.pixels, frames, 4.0);
@@ -192,7 +192,7 @@ void look(const std::string& folder) {
   }
 }
 
-/// A press at rest near the centre of a simulated sensor, and what the LUTs make of other balls.
+/// Evaluates a press at rest near the centre of a simulated sensor, and the LUTs on other balls.
 void look(const model_study::Specimen& specimen, std::uint64_t seed) {
   const model_study::Result result = model_study::measure(specimen, seed, 1, 6);
   fmt::print(
@@ -212,7 +212,7 @@ void look(const model_study::Specimen& specimen, std::uint64_t seed) {
   look(model, material.reference_q8, material.centre);
 }
 
-/// 2 mm, 3 mm, another law, and the sensors fitted to the real ones.
+/// Gels of 2 mm and 3 mm, another law, and the sensors fitted to the real ones.
 std::vector<model_study::Specimen> simulated() {
   const std::vector<model_study::Specimen> all = model_study::specimens();
   std::vector<model_study::Specimen> some = {all[1], all[3], all.back()};

@@ -68,8 +68,8 @@ std::vector<Specimen> specimens() {
     all.push_back(
         {std::to_string(thickness).substr(0, 3) + " mm", thickness::sensor_of(thickness)});
   }
-  // Chosen before anything was measured on them: curved and steep, flat and wide, a kink at zero,
-  // hardly any narrow light.
+  // Chosen before any measurement on them: curved and steep, flat and wide, a kink at zero,
+  // little narrow light.
   all.push_back(with_optics("curved", 2.0,
                             {.pressed_slope = 0.26,
                              .pressed_curve = -0.05,
@@ -159,7 +159,7 @@ Result measure(const Specimen& specimen, std::uint64_t seed, int presses, int te
     by_free = std::make_unique<Reader>(presses == 1 ? table::alone_single(material)
                                                     : table::alone_many(material));
   } catch (const std::runtime_error&) {
-    by_free.reset();  // a chain of presses asks for a light one; result.free_mm stays NaN
+    by_free.reset();  // a chain of presses needs a light one; result.free_mm stays NaN
   }
   double depth = 0;
   for (std::size_t i = 0; i < trial.tests.size(); ++i) {

@@ -12,33 +12,33 @@
 
 namespace dtact::model_study {
 
-/// A simulated sensor that a calibration is judged on.
+/// A simulated sensor on which a calibration is judged.
 struct Specimen {
   std::string name;
   hal::sim::Scene scene;
 };
 
-/// Gels of 1.5, 2, 2.5 and 3 mm, then four other optics, then one of another law of gel and
-/// light, which no gel that is fitted can be.
+/// Gels of 1.5, 2, 2.5 and 3 mm, then four other optics, then one with another law of gel and
+/// light, which no fitted gel can have.
 [[nodiscard]] std::vector<Specimen> specimens();
 
 /// Result of one specimen and seed. Errors are mean absolute errors against the simulator's
 /// indentation in contact with the ball, millimetres, no offset removed.
 struct Result {
-  std::string refused;  ///< Why; then only `free_mm` is measured.
+  std::string refused;  ///< The reason, or empty; then only `free_mm` is measured.
   std::optional<calibration::ModelFit> fit;
   double light_levels = 0;
   double seconds = 0;  ///< Time of the calibration.
   double true_depth_mm = 0;
   double free_mm = std::numeric_limits<double>::quiet_NaN();  ///< Under a 5 mm ball, by the free
                                                               ///< LUT of the same images.
-  double model_mm = 0;                                        ///< By the model's.
+  double model_mm = 0;                                        ///< By the model's LUT.
   double ours_mm = 0;                                         ///< By the default method.
-  std::string note;                                           ///< What that says of itself.
-  /// By its LUTs for one and two steps of the filter, as the daemon applies it.
+  std::string note;                                           ///< The default method's message.
+  /// By the model's LUTs for one and two steps of the filter, as the daemon applies it.
   std::array<double, 2> sharpened_mm = {};
-  double bias_mm = 0;    ///< Its mean error with its sign.
-  double stated_mm = 0;  ///< What it says of itself at the tests' mean depth.
+  double bias_mm = 0;    ///< The default method's mean error with its sign.
+  double stated_mm = 0;  ///< Its stated uncertainty at the tests' mean depth.
 };
 
 /// `presses` 1: the press near the centre; else this many presses anywhere.

@@ -8,7 +8,7 @@
 
 namespace dtact {
 
-/// Images of a ball, without a lens, as a calibration is built from them.
+/// Images of a ball, without a lens, as input of a calibration.
 [[nodiscard]] inline calibration::BallPress ball_press(const PressImages& images, double mm_per_px,
                                                        double radius_mm = 4) {
   calibration::BallPress press;

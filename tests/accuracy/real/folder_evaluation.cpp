@@ -15,7 +15,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// The reference and the press of one object, or why they are not there.
+/// The reference and the press of one object, or why they are missing.
 std::string load_pair(const fs::path& folder, const char* object, ImageSet& reference,
                       ImageSet& press) {
   const fs::path reference_path = folder / (std::string(object) + "_reference.png");
@@ -101,7 +101,7 @@ std::vector<std::string> lines_of(const FolderEvaluation& e) {
   } else {
     lines.push_back("lens: skipped: " + e.no_pins);
   }
-  if (e.ball && e.calibration) {  // which made it
+  if (e.ball && e.calibration) {  // made from this ball
     lines.push_back(fmt::format(
         "ball: contact at row {:.1f}, column {:.1f} of the rectified image, offset {:+.4f} mm "
         "taken "

@@ -13,12 +13,13 @@
 namespace dtact::ctl {
 
 /// Results from a folder of a sensor's images: `board_reference.png` and `board.png`,
-/// `ball_reference.png` and `ball.png`. What could not be done is empty and has its reason.
+/// `ball_reference.png` and `ball.png`. Results that could not be computed are empty, with a
+/// reason.
 struct FolderEvaluation {
   std::optional<PinPress> pins;
   PinGain gain;                                         ///< The gain that the pins select.
   std::string no_pins;                                  ///< Why there is no lens.
-  std::optional<calibration::Calibration> calibration;  ///< On the rectified image, of the ball.
+  std::optional<calibration::Calibration> calibration;  ///< From the ball, on the rectified image.
   std::optional<calibration::Evaluation> ball;
   std::string no_ball;
   std::optional<PinDepths> pin_depths;
@@ -29,13 +30,13 @@ struct FolderEvaluation {
   ImageSet ball_images;
 };
 
-/// Evaluates a folder. The scale is that of the lens, which the board's pitch gives. Throws
+/// Evaluates a folder. The lens has the scale, from the board's pitch. Throws
 /// std::runtime_error when the folder is missing or an image cannot be read.
 [[nodiscard]] FolderEvaluation evaluate_folder(const std::filesystem::path& folder,
                                                const Board& board, double ball_radius_mm);
 
-/// Writes a page of pictures: index.html and PNG files, whole or not at all; an old page is
-/// replaced. `name` is the page's title.
+/// Writes a page of pictures: index.html and PNG files, completely or not at all; replaces an old
+/// page. `name` is the page's title.
 void write_page(const FolderEvaluation& evaluation, const std::string& name,
                 const std::filesystem::path& folder);
 

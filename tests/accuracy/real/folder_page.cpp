@@ -21,7 +21,7 @@ void cross(Picture& picture, recon::Point at, int arm, const cv::Scalar& colour)
   cv::drawMarker(picture, cv::Point2d(at.x, at.y), colour, cv::MARKER_CROSS, 2 * arm + 1);
 }
 
-/// Darkening as grey: black least, white most, the outermost two parts in a thousand cut off.
+/// Darkening as grey: black least, white most, without two parts in a thousand at either end.
 Picture grey_of(int width, int height, const std::vector<float>& levels) {
   std::vector<float> sorted;
   std::ranges::copy_if(levels, std::back_inserter(sorted), [](float v) { return !std::isnan(v); });
@@ -42,8 +42,8 @@ Picture grey_of(int width, int height, const std::vector<float>& levels) {
   return picture;
 }
 
-/// The camera's view of the board with the pins found and, twenty times as long, how far each is
-/// from where the lens through all others expects it.
+/// The camera's view of the board with the pins found. Twenty times enlarged: the distance of each
+/// from the place that the lens through all others expects.
 std::string pins_png(const FolderEvaluation& e, const PinPress& pins) {
   constexpr double kLonger = 20;
   const cv::Mat1f levels(mean_levels(e.board_reference) - mean_levels(e.board));

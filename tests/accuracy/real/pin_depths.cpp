@@ -11,7 +11,7 @@
 namespace dtact::ctl {
 namespace {
 
-/// Takes the plane through the pins' depths off and fills in what is left.
+/// Subtracts the plane through the pins' depths and computes the other results.
 void judge(PinDepths& depths, const std::vector<Mark>& marks) {
   const auto n = static_cast<int>(marks.size());
   cv::Mat1d plane(n, 3);
@@ -32,8 +32,8 @@ void judge(PinDepths& depths, const std::vector<Mark>& marks) {
   depths.spread = std::sqrt(rest.dot(rest) / n) / depths.mean_mm;
 }
 
-/// Depth at a place from a paraboloid through the disc of `reach` pixels about it: the greatest
-/// single pixel would be the one with the most noise. NaN when not all of the disc is trusted.
+/// Depth at a place from a paraboloid through the disc of `reach` pixels about it: the largest
+/// single pixel would have the most noise. NaN unless all of the disc is trusted.
 double peak_um(const std::vector<float>& um, int width, int height, double col, double row,
                double reach) {
   constexpr int kTerms = 6;
@@ -71,7 +71,7 @@ PinDepths read_pins(const PinPress& pins, const PinGain& gain,
                               model.rectify.height, model.mm_per_px};
   const double reach = board.pitch_mm / 5 / model.mm_per_px;
   PinDepths depths;
-  std::vector<Mark> read;  // Those inside the trusted map.
+  std::vector<Mark> read;  // Pins inside the trusted map.
   for (std::size_t i = 0; i < pins.marks.size(); ++i) {
     const Mark& mark = pins.marks[i];
     const recon::Point at = map_pixel(pins.lens.lens, place, mark.mm);

@@ -11,10 +11,10 @@
 
 namespace dtact::ctl {
 
-/// How evenly a calibration reads the pins of a board, which are all of one length.
+/// How evenly a calibration reads the pins of a board, which are equally long.
 struct PinDepths {
-  /// Of each pin inside the trusted map, at its centre (a paraboloid about it), under the gain that
-  /// the others chose.
+  /// Depth of each pin inside the trusted map, at its centre (a paraboloid about it), with the gain
+  /// that the other pins chose.
   std::vector<double> mm;
   double mean_mm = 0;
   double tilt_x_um_per_mm = 0;  ///< Slope of the plane through them, removed below.
@@ -22,9 +22,9 @@ struct PinDepths {
   double spread = 0;  ///< Standard deviation without the tilt over the mean.
 };
 
-/// `calibration`: on the image that the pins' lens rectifies; `gain`: as the pins chose it;
-/// `reference_q8`, `frames`: of the board. Throws std::runtime_error when fewer than three in four
-/// pins lie inside the trusted map or they read no depth; else as mean_depth_um().
+/// `calibration` is on the image that the pins' lens rectifies, `gain` the pins' choice,
+/// `reference_q8` and `frames` images of the board. Throws std::runtime_error when fewer than three
+/// in four pins are inside the trusted map or they read no depth; else like mean_depth_um().
 [[nodiscard]] PinDepths read_pins(const PinPress& pins, const PinGain& gain,
                                   const calibration::Calibration& calibration,
                                   std::span<const std::uint16_t> reference_q8,

@@ -1,5 +1,5 @@
-// What calibrate says against a calibration, on real ball presses: nothing about healthy ones, and
-// what is wrong where scale, radius, light or picture are.
+// Doubts that dtact-calibrate reports on real ball presses: none about healthy ones, and the cause
+// where scale, radius, light or picture are wrong.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <gmock/gmock.h>
@@ -47,7 +47,7 @@ TEST_P(PlausiblePress, NothingIsSaidOfHealthyOnes) {
   BallPress published = ball_press(images_, scale());
   published.method = recon::Method::published;
   EXPECT_THAT(doubts_of(published), IsEmpty());
-  // A tenth of the scale less: one press does not show it.
+  // The scale is a tenth too small: one press does not show it.
   EXPECT_THAT(doubts_of(ball_press(images_, 0.9 * scale())), IsEmpty());
 }
 
@@ -67,7 +67,7 @@ TEST_P(PlausiblePress, ADecimalPointOff) {
 }
 
 TEST_P(PlausiblePress, APressHalfInTheDark) {
-  // Both images black from a column within the contact on.
+  // Both images are black from a column within the contact on.
   for (const double part : {0.52, 0.55}) {
     PressImages dark{images_.reference.clone(), images_.frame.clone()};
     const int from = static_cast<int>(part * dark.frame.cols);
@@ -94,7 +94,7 @@ TEST_P(PlausiblePress, APressInACornerThatIsDark) {
 INSTANTIATE_TEST_SUITE_P(Sensors, PlausiblePress, testing::Values("sensor_a", "sensor_b"),
                          [](const auto& sensor) { return std::string(sensor.param); });
 
-// The press of sensor_a is 1.9 mm deep, almost half of the radius, where scale and radius show.
+// The press of sensor_a is 1.9 mm deep, almost half of the radius, so scale and radius show.
 TEST(PlausibleDeepPress, AWrongScaleRadiusOrLight) {
   const auto folder = sensor_folder("sensor_a");
   if (!folder) GTEST_SKIP() << "the real images are not beside the repository";

@@ -1,5 +1,5 @@
-// The press's own gain on real ball presses: what of them a fit did not see reads better with it,
-// and the zero of the LUT hangs less on what one happens to look at.
+// The press's own gain on real ball presses: parts that a fit did not see read better with it, and
+// the zero of the LUT depends less on the choice of pixels.
 #include "clients/calibrate/fit/press_asymmetry.hpp"
 
 #include <fmt/format.h>
@@ -22,9 +22,9 @@ struct Expected {
   double mm_per_px;
   AsymmetryOrder order;
   double sectors_mm;  ///< Left-out error, at most.
-  double reach_mm;    ///< How far the zeros may lie apart with the reach,
-  double start_mm;    ///< … with the centre that the fit starts from,
-  double sector_mm;   ///< … with the sectors that everything is fitted on.
+  double reach_mm;    ///< Limit of the zeros' difference with the reach,
+  double start_mm;    ///< … with the centre at which the fit starts,
+  double sector_mm;   ///< … with the sectors used for fitting.
 };
 
 class RealPressAsymmetry : public testing::TestWithParam<Expected> {
@@ -42,7 +42,7 @@ class RealPressAsymmetry : public testing::TestWithParam<Expected> {
                             double reach = 0.9) const {
     const PressAsymmetry gain = fit_asymmetry(sure_samples(settled_.map, start, use), 4, order);
     SymmetricPress level = without_asymmetry(settled_.map, start, gain);
-    level.contact.radius_mm *= reach / 0.9;  // fit_sag() looks at nine tenths of it
+    level.contact.radius_mm *= reach / 0.9;  // fit_sag() uses nine tenths of it
     return fit_sag(level.map, level.contact, use).depth_mm;
   }
   [[nodiscard]] std::vector<double> by_reach(AsymmetryOrder order) const {
@@ -104,7 +104,7 @@ TEST_P(RealPressAsymmetry, TheZeroHangsLittleOnReachStartAndSector) {
   apart("by sector, without a gain", by_sector(AsymmetryOrder::none));
 }
 
-// The goal for the zero is 0.03 mm; sensor_b's lopsided press, without its lens, misses it by
+// The goal for the zero is 0.03 mm; sensor_b's asymmetric press, without its lens, misses it with
 // reach.
 INSTANTIATE_TEST_SUITE_P(Sensors, RealPressAsymmetry,
                          testing::Values(Expected{"sensor_a", 0.0510, AsymmetryOrder::quadratic,

@@ -12,12 +12,12 @@ struct PressImages {
   cv::Mat1f frame;
 };
 
-/// The folder of a sensor's real images, or none where they are not beside the repository.
+/// The folder of a sensor's real images; nothing when they are not beside the repository.
 [[nodiscard]] std::optional<std::filesystem::path> sensor_folder(const char* sensor);
 /// `object`: "board" or "ball".
 [[nodiscard]] PressImages load_pair(const std::filesystem::path& folder, const char* object);
 
-// What other sensors of the family do to such images. Results are rounded to whole grey levels, as
+// Changes as in other sensors of the family. Results are rounded to whole grey levels, as
 // a camera would.
 
 /// Portrait: a quarter turn clockwise.
@@ -30,8 +30,8 @@ struct PressImages {
 /// Light that leaks in at the left edge in one image and at the bottom in the other, up to 60
 /// levels.
 [[nodiscard]] PressImages leaking(const PressImages& board);
-/// Within `radius` pixels of a place the darkening of the ring around it, with a pixel noise of one
-/// grey level: as if the pin were broken off.
+/// Within `radius` pixels of a place, the darkening of the ring around it, with a pixel noise of
+/// one grey level: as if the pin were broken off.
 [[nodiscard]] PressImages without_pin(const PressImages& board, cv::Point place, double radius);
 
 }  // namespace dtact

@@ -31,7 +31,7 @@ TEST(RealFolder, SensorA) {
   EXPECT_LE(e.ball->half_mae_mm.value_or(1), 0.0095);
   EXPECT_LE(e.ball->sector_mae_mm.value_or(1), 0.0095);
   EXPECT_EQ(e.ball->press_asymmetry.gain.order, calibration::AsymmetryOrder::plane);
-  // The goal is 0.05; README.md says what is known about the rest.
+  // The goal is 0.05; README.md explains the rest.
   EXPECT_LE(e.pin_depths->spread, 0.065);
   // The published scale of the rectified images; the lens varies by this much over the map.
   EXPECT_NEAR(recon::central_mm_per_px(e.pins->lens.lens), 0.05102, 0.002);
@@ -46,7 +46,7 @@ TEST(RealFolder, SensorBIsAHardPress) {
   EXPECT_LE(e.ball->half_mae_mm.value_or(1), 0.04);
   EXPECT_LE(e.ball->sector_mae_mm.value_or(1), 0.045);
   EXPECT_EQ(e.ball->press_asymmetry.gain.order, calibration::AsymmetryOrder::quadratic);
-  EXPECT_LE(e.pin_depths->spread, 0.05);  // each pin left out of the gain that judges it
+  EXPECT_LE(e.pin_depths->spread, 0.05);  // the gain for each pin comes from the others
 }
 
 TEST(RealFolder, SensorCSaysThatThereIsNoBall) {
@@ -102,7 +102,7 @@ TEST(RealFolder, ThePageIsWrittenWholeAndReplaced) {
   EXPECT_TRUE(std::filesystem::exists(page / "notes.txt"));
 }
 
-// What is judged is not what dtact-calibrate depth makes unless it is asked to.
+// dtact-calibrate depth does not make the judged calibration unless its method is selected.
 TEST(FolderEvaluation, NamesTheMethodThatItJudges) {
   calibration::BallPress press{.reference_q8 = calibration::Ball{}.reference_image_q8(),
                                .frames = {calibration::Ball{}.frame()},

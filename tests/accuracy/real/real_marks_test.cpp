@@ -1,6 +1,6 @@
-// Whether a moved camera shows in the faint marks of real gels: two references of one sensor,
-// taken apart, are still; what belongs to the gel in one of them is then moved, its stripes and
-// noise's place in the frame are not.
+// Whether a moved camera shows in the faint marks of real gels. Two references of one sensor,
+// taken at different times, are still; then the gel's detail in one of them is moved, but its
+// stripes and the noise's place in the frame are not.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -25,7 +25,7 @@ GelMarks marks_of(const cv::Mat1f& image) {
   return {q8, image.cols, {60, 40, image.cols - 120, image.rows - 80}};
 }
 
-/// The fine detail goes `x` to the right and `y` down; smooth light and vertical stripes stay.
+/// Moves the fine detail `x` to the right and `y` down; smooth light and vertical stripes stay.
 cv::Mat1f with_gel_moved(const cv::Mat1f& image, double x, double y) {
   cv::Mat1f smooth;
   cv::Mat1f gel;
@@ -58,7 +58,7 @@ TEST_P(RealMarks, AStillSensorsDoNotMoveAndAMovedOnesDo) {
     ADD_FAILURE() << fmt::format("still, but moved by {}, {}: {:.1f}", still->x, still->y,
                                  still->strength);
   }
-  // Half a pixel is what temperature does.
+  // Temperature alone moves it by half a pixel.
   EXPECT_FALSE(then.moved_to(marks_of(with_gel_moved(image, 0.4, 0.3))));
   for (const auto& [x, y] : {std::pair{2, 1}, {3, -2}, {-5, 4}, {0, 12}}) {
     const auto move =

@@ -1,7 +1,7 @@
-// How well motion is found on what real sensors see: the darkening that a ball or a board of pins
-// makes in a real image is moved by computer over the sensor's reference image, with a frame's
-// noise anew, made depth by the sensor's own calibration, and followed. What a real object's motion
-// does to the gel is not in it.
+// Accuracy of motion on images of real sensors with synthetic motion. The darkening of a ball or a
+// board of pins in a real image is moved over the sensor's reference image, with new noise for each
+// frame, converted to depth by the sensor's own calibration, and tracked. The gel's response to
+// motion is not included.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -144,7 +144,7 @@ class RealPose : public testing::TestWithParam<Sensor> {
     return frame;
   }
 
-  /// What the camera would see of the darkening after `motion`, made depth.
+  /// Depth of the camera's view of the darkening after `motion`.
   [[nodiscard]] std::vector<std::int16_t> depth(const recon::Model& model,
                                                 const std::vector<std::uint16_t>& reference,
                                                 const cv::Mat1f& light, const cv::Mat1f& loss,
@@ -191,7 +191,7 @@ TEST_P(RealPose, ABoardOfPinsSlidesAndTwists) {
   }
 }
 
-// sensor_b's lopsided press looks as if it showed two of a ball's three turns.
+// sensor_b's asymmetric press looks as if it showed two of a ball's three rotations.
 TEST_P(RealPose, ABallSlidesAndTurns) {
   for (const auto& [slide_mm, twist_deg] : {std::pair{kSlideMm, 0.0}, {0.0, kTwistDeg}}) {
     const Result result = follow("ball", slide_mm, twist_deg);

@@ -1,6 +1,5 @@
-// A folder's evaluation on real images changed as other sensors of the family would change
-// them: what the ball and the pins read must not hang on how the camera is turned or where the
-// light is weak.
+// A folder's evaluation on real images changed as in other sensors of the family. The ball's and
+// the pins' readings must not depend on the camera's rotation or on where the light is weak.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-// The pins of real boards in images changed as other sensors of the family would change them.
+// The pins of real boards in images changed as in other sensors of the family.
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -22,8 +22,8 @@ class RobustPins : public testing::TestWithParam<const char*> {
     if (!folder) GTEST_SKIP() << "the real images are not beside the repository";
     board_ = load_pair(*folder, "board");
   }
-  /// The pins are found, but for `faint` at the edge, and lie where the grid says, each judged by
-  /// the lens of the others.
+  /// The pins are found, except for `faint` at the edge, and are where the grid says; each is
+  /// judged by the lens of the others.
   static PinPress expect_found(const PressImages& board, const char* what, double bound_mm = 0.06,
                                std::size_t faint = 0) {
     const PinPress press = find_pins(board.reference, board.frame, {});
@@ -35,8 +35,8 @@ class RobustPins : public testing::TestWithParam<const char*> {
     EXPECT_LE(press.missing.size(), faint) << what;
     return press;
   }
-  /// The pins darken the image by 8 levels only; some of those at the edge drown in a leak of 30,
-  /// and it is said which.
+  /// The pins darken the image by 8 levels only; some of those at the edge vanish in a leak of 30,
+  /// which is reported.
   static bool has_faint_pins() { return GetParam() == std::string("sensor_c"); }
   PressImages board_;
 };

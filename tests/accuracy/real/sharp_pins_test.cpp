@@ -1,4 +1,4 @@
-// What the filter against scattering makes of the pins of a board on real sensors.
+// Effect of sharpening on the pins of a board on real sensors.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -22,26 +22,26 @@ namespace {
 
 using calibration::Calibration;
 
-/// A pin as the depth map shows it, the mean of those that lie wholly inside of it. Pins are 2.5 mm
+/// A pin in the depth map, the mean of those that are completely inside of it. Pins are 2.5 mm
 /// apart, 0.6 mm in radius, with a hemisphere as tip.
 struct MeanPin {
-  /// From the pin's axis, millimetres, where the depth has fallen by half from the tip's to the
-  /// least.
+  /// Distance from the pin's axis, millimetres, where the depth has fallen halfway from the tip's
+  /// to the least.
   double half_mm = 0;
-  /// Greatest fall, millimetres a millimetre.
+  /// Steepest fall, millimetres a millimetre.
   double slope = 0;
   /// Height of the tip above the least depth around it, millimetres.
   double height_mm = 0;
-  /// How much deeper than halfway to the next pin (along the rows and columns) the least depth
-  /// nearer to the pin lies, a share of the height. What is pressed aside rises evenly towards
-  /// there; a filter that rings leaves a trough round the pin.
+  /// Depth halfway to the next pin (along the rows and columns) minus the least depth
+  /// nearer to the pin, as a share of the height. Displaced gel rises evenly towards
+  /// there; a filter that rings leaves a trough around the pin.
   double trough = 0;
 };
 
 constexpr double kStepMm = 0.05;
 constexpr double kHalfwayMm = 1.25;
 
-/// Depth against the distance from the pins' axes, millimetres, steps of kStepMm up to halfway.
+/// Depth against the distance from the pins' axes, millimetres, in steps of kStepMm up to halfway.
 std::vector<double> mean_profile(const std::vector<float>& um, const PinPress& pins,
                                  const Calibration& calibration) {
   const recon::Model& model = *calibration.model;
@@ -104,7 +104,7 @@ MeanPin look(const std::vector<double>& profile) {
   return pin;
 }
 
-/// The board of one sensor as the daemon reads it, not sharpened, once and twice.
+/// The board of one sensor in the daemon's depth: not sharpened, once and twice.
 struct Pins {
   std::vector<MeanPin> mean;
   std::vector<double> spread;  ///< Spread of their depths.
@@ -131,7 +131,7 @@ Pins read_board(const std::string& name, const FolderEvaluation& e,
   return read;
 }
 
-/// By the gel that was fitted to the sensor's own ball.
+/// A calibration with the gel that was fitted to the sensor's own ball.
 Calibration by_gel(const FolderEvaluation& e) {
   calibration::BallPresses presses;
   presses.reference_q8 = e.ball_reference.mean_q8();
@@ -148,7 +148,7 @@ Calibration by_gel(const FolderEvaluation& e) {
   return made.calibration;
 }
 
-/// With the LUTs and the scattering of another sensor's.
+/// The same with the LUTs and the scattering of another sensor.
 Calibration by_gel_of(const Calibration& other, const FolderEvaluation& e) {
   const recon::Lens& lens = e.pins->lens.lens;
   Calibration made = calibration::empty_calibration(e.board_reference.mean_q8(), std::nullopt,
@@ -168,8 +168,8 @@ std::optional<FolderEvaluation> evaluated(const char* sensor) {
   return evaluate_folder(*folder, {}, 4.0);
 }
 
-/// Each step makes pins narrower, and no trough comes. `once`, `twice`: how much more of their mean
-/// the depths may differ by after one step and two; the goal is no more, which two steps miss.
+/// Each step makes pins narrower without a trough. `once` and `twice` limit how much more of their
+/// mean the depths may differ by after one step and two; the goal is no more, which two steps miss.
 void expect_narrower(const Pins& read, double once, double twice) {
   for (std::size_t i = 0; i + 1 < read.mean.size(); ++i) {
     EXPECT_LT(read.mean[i + 1].half_mm, read.mean[i].half_mm);
@@ -194,7 +194,7 @@ TEST(SharpPins, SensorA) {
   expect_steeper(read);
 }
 
-// Its lopsided press asks for light that is scattered 3.4 mm wide, which blurs no edge of a pin.
+// The fit of its asymmetric press has light scattered 3.4 mm wide, which blurs no edge of a pin.
 TEST(SharpPins, SensorBIsHardlySteeper) {
   const auto e = evaluated("sensor_b");
   if (!e) GTEST_SKIP() << "the real images are not beside the repository";

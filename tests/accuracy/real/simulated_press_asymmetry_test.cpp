@@ -1,5 +1,5 @@
-// A press's own gain where the truth is known: on simulated sensors it finds none under an even
-// light, and under one that falls to a side the depth stays right, beside the press as well.
+// A press's own gain where the truth is known. On simulated sensors it finds none under an even
+// light. Under light that falls to a side the depth stays right, beside the press as well.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -22,11 +22,11 @@ namespace sim = hal::sim;
 constexpr double kAtX = 1.5;  // mm from the middle, where the ball that calibrates is pressed
 constexpr double kAtY = 1.2;
 
-/// The sensor fitted to real images, a ball of 4 mm off the axis at 1.15 to 1.85 s, one of 5 mm far
+/// The sensor fitted to real images: a ball of 4 mm off the axis at 1.15 to 1.85 s, one of 5 mm far
 /// from it at 3.15 to 3.85 s.
 sim::Scene scene_of(const std::string& sensor) {
   sim::Scene scene = sim::load_scene(DTACT_SOURCE_DIR "/tests/accuracy/sim/" + sensor + ".toml");
-  scene.gel.solve_step_mm = 5;  // only what rests is looked at
+  scene.gel.solve_step_mm = 5;  // only objects at rest are judged
   const auto keys = [](double t, double x, double y, double depth) {
     return std::vector<sim::PressKey>{
         {t, x, y, 0, 0}, {t + 0.1, x, y, depth, 0}, {t + 0.9, x, y, depth, 0}, {t + 1, x, y, 0, 0}};
@@ -50,7 +50,7 @@ class Sensor {
     if (tilted) renderer_.set_gain(8.0 / 5);
   }
 
-  /// Eight frames from a moment on.
+  /// Eight frames from a time on.
   std::vector<image::Grey8> frames(double t) {
     std::vector<image::Grey8> frames;
     const int width = scene_.camera.width;
@@ -104,7 +104,7 @@ class Sensor {
   sim::LedLevels light_;
 };
 
-/// What a calibration from the first press does at it and beside it, mm.
+/// Errors of a calibration from the first press, at that press and beside it, mm.
 struct Errors {
   double here = 0;
   double beside = 0;
@@ -122,7 +122,7 @@ BallPress press_of(Sensor& sensor) {
   return press;
 }
 
-/// The LUT alone, about the centroid.
+/// The LUT only, about the centroid.
 recon::Model lut_alone(const BallPress& press, const recon::Model& made) {
   recon::Model model = made;
   model.gain = {};
@@ -164,7 +164,7 @@ TEST_P(SimulatedPressAsymmetry, UnderATiltedLightMiddleAndTiltAreFound) {
   EXPECT_NEAR(gain.factors[1], 0, 0.004);
 }
 
-/// Under the LUT alone, about the centroid, and as it is made now.
+/// Errors of the LUT only, about the centroid, and of the present method.
 struct BeforeAndNow {
   Errors before;
   Errors now;
@@ -186,7 +186,7 @@ TEST_P(SimulatedPressAsymmetry, TheTruthStaysRight) {
   const BeforeAndNow even = compare(GetParam(), false);
   EXPECT_LE(even.now.here, even.before.here + 0.001);
   EXPECT_LE(even.now.beside, even.before.beside + 0.001);
-  // What the zero of one press is wrong by stays; what the tilt does goes.
+  // The error of one press's zero stays; the error from the tilt vanishes.
   const BeforeAndNow tilted = compare(GetParam(), true);
   EXPECT_LE(tilted.now.here, even.now.here + 0.005);
   EXPECT_LE(tilted.now.beside, even.now.beside + 0.005);

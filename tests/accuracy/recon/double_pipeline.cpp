@@ -73,7 +73,7 @@ double look_up(const DepthLut& lut, double level) {
   return std::lerp(lut.um[low], lut.um[high], place - static_cast<double>(low));
 }
 
-/// x ← x + L − Hx, so often, from x = L on; H is two Gaussians, cut where nothing is left of them.
+/// x ← x + L − Hx, `steps` times, from x = L; H is two Gaussians, cut where they vanish.
 Plane sharpened(const Model& model, const Plane& levels, Size size, int steps) {
   constexpr double kCut = 5;
   Plane x = levels;

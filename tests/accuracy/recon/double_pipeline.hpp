@@ -10,7 +10,7 @@ namespace dtact::recon {
 
 /// The method `lut` in double precision, written from its definition and sharing no code with the
 /// fixed-point version: nothing is rounded or saturated between luma and the LUT, and the LUT is
-/// interpolated. `steps`: of sharpening, whose Gaussians both run on the map. Micrometres; NaN
+/// interpolated. `steps` of sharpening, whose Gaussians both run on the map. Micrometres; NaN
 /// where the darkening is beyond the LUT's covered range on the deep side or the light too weak.
 /// `luma` is frame sized without padding.
 [[nodiscard]] std::vector<double> reconstruct_in_double(const Model& model,

@@ -59,7 +59,7 @@ void expect_close(const Deviation& deviation, std::size_t min_trusted, const cha
   EXPECT_GE(deviation.trusted, min_trusted) << what;
 }
 
-/// A sensor that never was: vignetted light, a dent with a bulge around it, noise of one grey
+/// An invented sensor: vignetted light, a dent with a bulge around it, noise of one grey
 /// level.
 struct Synthetic {
   static constexpr int kWidth = 200;

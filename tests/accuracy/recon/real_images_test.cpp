@@ -64,7 +64,7 @@ TEST(RealImages, SensorAWithinItsBounds) {
 TEST(RealImages, SensorAWithADriftedReference) {
   std::optional<BallPress> press = real_press("sensor_a", 0.0510);
   if (!press) GTEST_SKIP() << "the real images are not beside the repository";
-  // Six levels stand out from the outskirts' unevenness (1.5); the sensor's own drift is 2.
+  // Six levels exceed the outskirts' unevenness (1.5); the sensor's own drift is 2.
   for (std::uint16_t& v : press->reference_q8.pixels) v = static_cast<std::uint16_t>(v + 6 * 256);
   const Evaluation e = judge(*press, "sensor_a_drifted");
   EXPECT_NEAR(e.drift_levels, 6, 2.5);
@@ -91,8 +91,8 @@ TEST(RealImages, SensorAPublished) {
   EXPECT_LT(lut.mae_mm, published.mae_mm);
 }
 
-// The hard case: the press is off its axis and the bulge lopsided, so that no LUT of one variable
-// fits. The bound only keeps it from getting worse unnoticed.
+// The hard case: the press is off its axis and the bulge asymmetric, so that no LUT of one variable
+// fits. The bound only detects that it gets worse.
 TEST(RealImages, SensorBReported) {
   const std::optional<BallPress> press = real_press("sensor_b", 0.05317);
   if (!press) GTEST_SKIP() << "the real images are not beside the repository";

@@ -10,13 +10,13 @@
 
 namespace dtact::accuracy {
 
-/// A grey image with fractions, row-major.
+/// A grey image of fractional levels, row-major.
 struct Image {
   int width = 0;
   int height = 0;
   std::vector<double> pixels;
 
-  /// Where pixel (column x, row y) lies in `pixels`.
+  /// Index of the pixel (column x, row y) in `pixels`.
   [[nodiscard]] std::size_t index(int x, int y) const {
     return static_cast<std::size_t>(y) * static_cast<std::size_t>(width) +
            static_cast<std::size_t>(x);
@@ -29,7 +29,7 @@ struct BallPress {
   Image ball;
 };
 
-/// What is known about a real sensor without fitting: the published scale of its images
+/// Known properties of a real sensor without fitting: the published scale of its images
 /// (shared/data/README.md).
 struct Sensor {
   std::string name;
@@ -38,7 +38,7 @@ struct Sensor {
 inline const Sensor kSensorA = {"sensor_a", 0.0510};
 inline const Sensor kSensorB = {"sensor_b", 0.0532};
 
-/// Pixels.
+/// A position in pixels.
 struct Centre {
   double x = 0;
   double y = 0;
@@ -64,10 +64,10 @@ struct Profile {
 /// The same two images from the simulator, each the mean of ten frames rounded to 8 bits, as the
 /// real ones are. The scene's press begins at t = 1 s.
 [[nodiscard]] BallPress simulate(const hal::sim::Scene& scene);
-/// The scene's first frame alone.
+/// The scene's first frame only.
 [[nodiscard]] Image simulate_frame(const hal::sim::Scene& scene);
 
-/// Centroid of the darkening, weighted by what exceeds five grey levels.
+/// Centroid of the darkening, weighted by the excess over five grey levels.
 [[nodiscard]] Centre centroid(const BallPress& press);
 
 [[nodiscard]] Profile radial_profile(const Image& change, const Centre& centre, double mm_per_px);
@@ -76,7 +76,7 @@ struct Profile {
 /// Root mean square of the difference of two profiles, grey levels.
 [[nodiscard]] double rms_difference(const Profile& a, const Profile& b);
 
-/// Standard deviation of what is left of an image when a Gaussian blur of 2 px is taken off, grey
+/// Standard deviation of an image minus its Gaussian blur of 2 px, grey
 /// levels, without a border of 20 px.
 [[nodiscard]] double high_pass_noise(const Image& image);
 

@@ -53,7 +53,7 @@ PinProfile profile_of(const cv::Mat1d& change, const Pins& pins, double mm_per_p
   return profile;
 }
 
-/// The centroid of what is at least half as dark as the darkest near a place.
+/// The centroid of the pixels that are at least half as dark as the darkest near a place.
 Centre pin_near(const cv::Mat1d& change, const Centre& guess, double reach_px) {
   const auto reach = static_cast<int>(reach_px);
   const cv::Rect window(static_cast<int>(guess.x) - reach, static_cast<int>(guess.y) - reach,
@@ -76,7 +76,8 @@ Centre pin_near(const cv::Mat1d& change, const Centre& guess, double reach_px) {
 }  // namespace
 
 PinProfile real_pins(const std::filesystem::path& folder, const Centre& middle) {
-  constexpr double kPublished_mm_per_px = 0.052;  // of all three, near enough to find pins
+  constexpr double kPublished_mm_per_px =
+      0.052;  // of all three sensors, accurate enough to find pins
   const image::Grey8 reference = image::read_png_grey8(folder / "board_reference.png");
   const image::Grey8 board = image::read_png_grey8(folder / "board.png");
   cv::Mat1d change(reference.height, reference.width);

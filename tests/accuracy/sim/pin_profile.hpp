@@ -9,17 +9,17 @@
 namespace dtact::accuracy {
 
 /// Mean darkening on rings about the middle nine pins of a pressed board, and between them, grey
-/// levels: what the scattering of a gel shows best.
+/// levels: these show the scattering of a gel best.
 struct PinProfile {
   static constexpr double kStep_mm = 0.1;
   /// Ring i reaches from i·kStep_mm to (i + 1)·kStep_mm; the pins are 2.5 mm apart.
   std::vector<double> change;
-  double between = 0;   ///< Half-way between two neighbours.
+  double between = 0;   ///< Halfway between two neighbours.
   double diagonal = 0;  ///< In the middle of four.
 };
 
 /// Profile of the folder's board_reference.png and board.png. The scale is the images': the
-/// mean distance of the nine pins. `middle`: near the middle pin, pixels.
+/// mean distance of the nine pins. `middle`: a place near the middle pin, pixels.
 [[nodiscard]] PinProfile real_pins(const std::filesystem::path& folder, const Centre& middle);
 
 /// Profile of the calibration board pressed this deep into the sensor of `scene`; without noise.

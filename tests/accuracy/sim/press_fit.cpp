@@ -65,9 +65,9 @@ void fit_light(const Image& reference, sim::Scene& scene) {
   scene.light.level *= scale;
 }
 
-// White noise whose high-pass standard deviation is `high_pass` in one rounded frame, and as near
-// as can be in the mean of ten; the blur takes 6 % off the variance of white noise (1 − 2·0.0398 +
-// 0.0199), rounding adds 1/12.
+// Sets white noise whose high-pass standard deviation is `high_pass` in one rounded frame, and as
+// near as possible in the mean of ten. The blur takes 6 % off the variance of white noise (1 −
+// 2·0.0398 + 0.0199), rounding adds 1/12.
 void fit_noise(double high_pass_of_ten, double mean_grey, sim::Scene& scene) {
   const double one = kNoiseOfOne * kNoiseOfOne / 0.94 - 1.0 / 12;
   const double ten = (high_pass_of_ten * high_pass_of_ten / 0.94 - 1.0 / 12) * 10;
@@ -131,7 +131,7 @@ sim::OpticsModel to_model(const std::vector<double>& p) {
   return optics;
 }
 
-// How far the optics lie outside what is physical; 0 inside. In shared/physics.md's terms: a mild
+// Distance of the optics from the physical range; 0 inside. In shared/physics.md's terms: a mild
 // curve (the slope at the deepest press is at least half of that at the surface), steeper on the
 // bulge than on the pressed side, and a second scattering that is wider and weaker.
 double unphysical(const std::vector<double>& p, double thickness_mm) {
@@ -176,7 +176,7 @@ Fit fit_sensor(const Sensor& sensor, const BallPress& real) {
       return excess > 0 ? 100 * (1 + excess) : rms_difference(profile(to_model(p)), target);
     };
     const std::vector<double> step = {0.03, -0.01, 0.1, -0.3, 0.1, -0.3, -0.1};
-    for (int round = 0; round < 2; ++round) {  // a fresh simplex leaves a collapsed one's corner
+    for (int round = 0; round < 2; ++round) {  // a new simplex escapes from a collapsed one
       optics = nelder_mead(cost_of_optics, optics, step, 300, 1e-4);
     }
     const double rms = cost_of_optics(optics);

@@ -16,8 +16,9 @@ struct Fit {
   double rms = 0;  ///< RMS of the profiles' difference, grey levels.
 };
 
-/// Twelve parameters: depth, thickness, four of the response and three of the scattering by the
-/// radial profile; level and vignetting by the reference image; read noise by its high-pass noise.
+/// Fits twelve parameters: depth, thickness, four of the response and three of the scattering to
+/// the radial profile; level and vignetting to the reference image; read noise to its high-pass
+/// noise.
 [[nodiscard]] Fit fit_sensor(const Sensor& sensor, const BallPress& real);
 
 }  // namespace dtact::accuracy

@@ -13,8 +13,8 @@ struct ProfilePanel {
   Profile simulated;
 };
 
-/// Darkening over radius, real points on the simulated line, the difference below; panels side by
-/// side.
+/// Darkening over radius, real points on the simulated line, the difference below; one panel a
+/// sensor.
 [[nodiscard]] std::string profile_svg(const std::vector<ProfilePanel>& panels);
 
 }  // namespace dtact::accuracy

@@ -12,7 +12,7 @@ namespace {
 const std::filesystem::path kData = DTACT_SHARED_DIR "/data";
 const std::filesystem::path kHere = DTACT_SOURCE_DIR "/tests/accuracy/sim";
 
-// Where shared/data/README.md has the middle pin.
+// The middle pin's place in shared/data/README.md.
 constexpr Centre kMiddleOfA = {327, 240};
 constexpr Centre kMiddleOfC = {324, 244};
 
@@ -25,8 +25,8 @@ void report(const char* what, const PinProfile& simulated, const PinProfile& rea
       simulated.diagonal + offset);
 }
 
-// sensor_a.toml knows one press of a ball. What is 0.6 mm wide and 2.5 mm apart it has not seen;
-// only the depth of the pins is chosen here.
+// sensor_a.toml was fitted to one press of a ball, not to objects 0.6 mm wide and 2.5 mm apart;
+// only the depth of the pins is fitted here.
 TEST(SimPins, TheBallOfSensorAPredictsItsPins) {
   if (!std::filesystem::exists(kData / "sensor_a")) {
     GTEST_SKIP() << "the real images of sensor_a are not at " << kData;
@@ -37,7 +37,7 @@ TEST(SimPins, TheBallOfSensorAPredictsItsPins) {
   EXPECT_LE(rms_difference(simulated, real, 0), 1.5);
 }
 
-// The other law is as much like sensor_a.
+// The other law fits sensor_a as well.
 TEST(SimPins, AnotherLawShowsThePinsOfSensorA) {
   if (!std::filesystem::exists(kData / "sensor_a")) {
     GTEST_SKIP() << "the real images of sensor_a are not at " << kData;

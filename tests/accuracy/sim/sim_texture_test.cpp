@@ -1,5 +1,5 @@
-// The faint texture of the simulated gel against that of sensor_a: what two references of one
-// sensor, taken apart, have in common at three widths.
+// The faint texture of the simulated gel against that of sensor_a: the common part of two
+// references of one sensor, taken at different times, at three widths.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -20,7 +20,7 @@ namespace sim = hal::sim;
 
 const std::filesystem::path kFolder = DTACT_SHARED_DIR "/data/sensor_a";
 
-/// Takes its median off each row or column: a stripe of the camera's.
+/// Subtracts its median from each row or column: a stripe of the camera's.
 void remove_stripes(cv::Mat1f& image, bool columns) {
   cv::Mat1f sorted;
   if (columns) {
@@ -53,7 +53,7 @@ cv::Mat1f detail(const cv::Mat1f& image, double fine, double wide) {
   return band;
 }
 
-/// Standard deviation of what both have, grey levels.
+/// Standard deviation of the common part, grey levels.
 double shared(const cv::Mat1f& a, const cv::Mat1f& b, double fine, double wide) {
   const double product = detail(a, fine, wide).dot(detail(b, fine, wide));
   return std::sqrt(std::max(0.0, product / static_cast<double>(a.total())));

@@ -20,7 +20,7 @@ hal::sim::Scene seen_by_its_camera(hal::sim::Scene sensor) {
   sensor.camera.height = kHeight;
   sensor.camera.mm_per_px = kMmPerPx;
   sensor.camera.fps = kFps;
-  // Half a pillar's radius is 2.5 points; half of that moves a dip by 0.02.
+  // Half a pillar's radius is 2.5 grid points; halving the spacing changes a dip by 0.02.
   sensor.gel.grid_mm = 0.1;
   sensor.gel.solve_step_mm = 5;
   sensor.loop_from_s = sensor.loop_to_s = 0;

@@ -12,22 +12,22 @@
 
 namespace dtact::study {
 
-/// Nothing where a law was not put through that.
+/// Nothing where a law was not measured.
 using Value = std::optional<double>;
 
 [[nodiscard]] bool within(Value value, const figures::Range& range);
 /// Within two standard deviations of the units.
 [[nodiscard]] bool within(Value value, const figures::Spread& spread);
 
-/// Rows as they are made, by whoever knows a subject of the study: it knows which results belong to
-/// which law and gel. `results` must outlive it.
+/// Rows as the parts of the study add them; each part knows which results belong to which law and
+/// gel. `results` must outlive it.
 class Comparison {
  public:
   explicit Comparison(const std::vector<Result>& results);
 
-  /// The first one is judged.
+  /// Laws in the results; the first one is judged.
   [[nodiscard]] const std::vector<std::string>& laws() const noexcept { return laws_; }
-  /// Null where there is none.
+  /// Null without such results.
   [[nodiscard]] const Result* find(const std::string& law, double thickness_mm) const;
   /// Mean over the gels.
   [[nodiscard]] Value over_gels(const std::string& law,

@@ -2,7 +2,7 @@
 
 #include <array>
 
-/// What the study reports of 17 real sensors with gels of 1, 2 and 3 mm: the public repository
+/// Figures of the study about 17 real sensors with gels of 1, 2 and 3 mm: the public repository
 /// hqhan03/VBTS_test, docs/shape_reconstruction.md, docs/spatial_resolution.md and result/, figures
 /// only. Nothing in the simulator or in a method is tuned on them.
 namespace dtact::study::figures {
@@ -29,22 +29,22 @@ struct Spread {
   double median = 0;
   double sd = 0;
 };
-/// Bias on the flat cylinder at 0.1 … 0.6 mm, mm; the ball's zero corrected.
+/// Bias on the flat cylinder at 0.1 … 0.6 mm, mm; with the ball's zero corrected.
 inline constexpr std::array<Spread, 6> kBias_mm = {{{-0.072, 0.027},
                                                     {-0.073, 0.034},
                                                     {-0.031, 0.045},
                                                     {-0.012, 0.052},
                                                     {-0.028, 0.056},
                                                     {-0.090, 0.067}}};
-/// Over all six depths, the zero not corrected.
+/// Over all six depths, with the zero not corrected.
 inline constexpr Range kBiasUncorrected_mm = {-0.107, -0.170, -0.045};
-/// How deep below the surface F ∝ d^1.5 puts a ball's first contact.
+/// Depth below the surface at which F ∝ d^1.5 puts a ball's first contact.
 inline constexpr Spread kBallZero_mm = {0.155, 0.029};
 
 /// How many of the spacings 1.25, 1.5, 1.75 and 2 mm a unit resolves, by gel: mean over units.
 inline constexpr std::array<Range, 3> kResolvedOfFour = {{{1.83, 0, 3}, {3.0, 2, 4}, {0.67, 0, 2}}};
-/// The weaker peak over the stronger, by gel: median over a unit's presses; how far the study's
-/// pillars lean.
+/// The weaker peak over the stronger, by gel: median over a unit's presses. It shows how far the
+/// study's pillars lean.
 inline constexpr std::array<Range, 3> kSymmetry = {
     {{0.73, 0.53, 0.84}, {0.89, 0.74, 0.91}, {0.64, 0.57, 0.74}}};
 /// Median dip over units and the depths 0.1, 0.2 and 0.3 mm.
@@ -62,7 +62,7 @@ struct DipByDepth {
 };
 inline constexpr std::array<DipByDepth, 4> kNearestDips = {
     {{0.1, 0.391, 2.99}, {0.2, 0.178, 4.44}, {0.3, 0.121, 7.96}, {0.6, 0.044, 16.0}}};
-/// On 3 × 3 pixels averaged, where noise no longer makes dips, of units whose weaker peak counts:
+/// On 3 × 3 pixels averaged, where noise no longer makes dips, of units whose weaker peak is high
 /// result/extra/data/resolution_sweep_9DTact_pair*.csv at 640 pixels. One to three units a gel:
 /// at least 0.05 either way, which one reading of a dip scatters by.
 struct AveragedDips {
@@ -74,7 +74,7 @@ inline constexpr std::array<AveragedDips, 2> kAveragedDips = {
     {{2.0, 0.3, {{{0.56, 0.51, 0.59}, {0.49, 0.44, 0.54}, {0.34, 0.29, 0.39}}}},
      {2.5, 0.6, {{{0.69, 0.64, 0.74}, {0.58, 0.53, 0.63}, {0.62, 0.57, 0.67}}}}}};
 
-/// Depth (of a ball: above its zero), force, and what is darker than 5 grey levels: radius and
+/// Depth (for a ball: above its zero), force, and the patch darker than 5 grey levels: radius and
 /// mean.
 struct ForcePoint {
   double depth_mm = 0;

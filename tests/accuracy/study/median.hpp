@@ -7,7 +7,7 @@
 
 namespace dtact::study {
 
-/// The upper one of two middle values; nothing of nothing.
+/// The upper one of two middle values; nothing for an empty vector.
 inline std::optional<double> median(std::vector<double> values) {
   if (values.empty()) return std::nullopt;
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);

@@ -15,7 +15,7 @@ Value dip(const Result& result, double spacing_mm, double tilt_deg, double depth
           const std::function<double(const PillarPress&)>& value) {
   for (const PillarPress& p : result.pillars) {
     if (p.spacing_mm == spacing_mm && p.tilt_deg == tilt_deg && p.depth_mm == depth_mm) {
-      if (p.seen.peak <= 0) break;  // too faint to be found: the study leaves those out, too
+      if (p.seen.peak <= 0) break;  // too faint to be found: the study skips these, too
       return value(p);
     }
   }

@@ -37,7 +37,7 @@ void each_pixel(const Darkening& image, const Visit& visit) {
   }
 }
 
-/// What is at least `depth` around the middle of the map.
+/// The area around the middle of the map that is at least `depth` deep.
 FlatReading measured_patch(const cv::Mat1f& depth, double half, double mm_per_px) {
   cv::Mat1b deep;
   cv::compare(depth, half, deep, cv::CMP_GE);
@@ -69,7 +69,7 @@ double noise_of(const std::vector<Bin>& profile) {
   return median(steps).value_or(0) / 0.6745 / std::numbers::sqrt2;
 }
 
-/// The darkening along the axis of the darkest, empty where nothing is dark.
+/// The darkening along the axis of the darkest part, empty where nothing is dark.
 std::vector<Bin> profile_along_axis(const Darkening& image) {
   constexpr double kFrom = 4;  // grey levels
   constexpr double kHalfBand_mm = 0.4;

@@ -5,7 +5,7 @@
 
 #include "tests/accuracy/study/bench.hpp"
 
-/// What the study reads in its images, by the rules that it states. The object is at the image's
+/// The study's measurements in its images, by its own rules. The object is at the image's
 /// centre.
 namespace dtact::study {
 
@@ -24,14 +24,14 @@ struct StudyLut {
 /// Throws std::runtime_error when the presses show fewer than four grey levels.
 [[nodiscard]] StudyLut make_lut(std::span<const KnownPress> presses, double ball_radius_mm);
 
-/// A depth map read by the LUT and what a flat object's is judged by.
+/// A depth map from the LUT and the measures of a flat object in it.
 struct FlatReading {
   double depth_mm = 0;     ///< Median within 1 mm of the centre.
-  double diameter_mm = 0;  ///< Radius of a circle as large as what is at least half as deep.
+  double diameter_mm = 0;  ///< Diameter of a circle as large as the part at least half as deep.
   double side_mm = 0;      ///< Mean of that patch's width and height.
 };
-/// The published reading: levels smoothed (Gaussian, 7 × 7), the LUT less its entry at 2 grey
-/// levels, smoothed twice more.
+/// Reads a map like the published pipeline: levels smoothed (Gaussian, 7 × 7), the LUT less its
+/// entry at 2 grey levels, smoothed twice more.
 [[nodiscard]] FlatReading read_flat(const Darkening& image, const StudyLut& lut);
 
 /// Two pillars, `spacing_mm` between their centres.
@@ -43,14 +43,14 @@ struct Pillars {
   /// Peak ≥ 2.5 grey levels, dip ≥ 0.265 (Rayleigh) and ≥ 3 of its standard deviations.
   [[nodiscard]] bool resolved() const noexcept;
 };
-/// Along the greater axis of what is darker than 4 grey levels, from its centroid, averaged over
-/// 0.4 mm to either side; peaks within 0.35 mm of where they should be, trough within 0.2 mm of the
-/// middle. All zero where nothing is that dark.
+/// Reads along the greater axis of the part darker than 4 grey levels, from its centroid, averaged
+/// over 0.4 mm to either side; peaks within 0.35 mm of their nominal places, trough within 0.2 mm
+/// of the middle. All zero where nothing is that dark.
 [[nodiscard]] Pillars read_pillars(const Darkening& image, double spacing_mm);
 
 /// The largest patch that is darker than a threshold, without specks and small holes (opened by 5
-/// pixels, closed by 11): radius of a circle as large, and the mean there, grey levels. Zero where
-/// there is none.
+/// pixels, closed by 11): radius of a circle of equal area, and the mean there, grey levels. Zero
+/// without a patch.
 struct Patch {
   double radius_mm = 0;
   double mean = 0;

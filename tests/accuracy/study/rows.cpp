@@ -18,7 +18,7 @@ namespace {
 
 using figures::Spread;
 
-/// Linear between rungs.
+/// Linear between depths.
 double between(std::span<const Rung> resolutions, double depth_mm,
                const std::function<double(const Rung&)>& value) {
   std::size_t i = 1;
@@ -32,7 +32,7 @@ Value deep_mean(const Result& result, const std::function<double(const Rung&)>& 
   double sum = 0;
   int count = 0;
   for (const Rung& resolution_index : result.resolutions) {
-    if (resolution_index.depth_mm < 0.35) continue;  // where the study judges sizes
+    if (resolution_index.depth_mm < 0.35) continue;  // the study judges sizes from here on
     sum += value(resolution_index);
     ++count;
   }
@@ -145,7 +145,7 @@ void add_forces(Comparison& comparison) {
             greatest <= 1.25 * least,
             study.ball ? "The force of a real ball grows more slowly with the depth than a linear "
                          "bonded gel's; a zero that is less than 0.155 mm off on this unit, or "
-                         "a block that gives way, would do that."
+                         "a block that yields, would do that."
                        : "The force of a flat face is linear in depth here by construction."};
     row.simulated.front() = fmt::format("{:.3f} … {:.3f}", least, greatest);
     comparison.add(std::move(row));

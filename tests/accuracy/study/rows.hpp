@@ -13,11 +13,11 @@ struct Row {
   std::string what;
   std::string study;
   std::vector<std::string> simulated;  ///< By law; "–" where it was not pressed.
-  bool agrees = false;                 ///< The first law's figure, within the study's spread.
-  std::string remark;                  ///< Why it does not, as far as it is known.
+  bool agrees = false;                 ///< The first law's figure is within the study's spread.
+  std::string remark;                  ///< Known reason for a difference.
 };
 
-/// `results`: of the gels of 1, 2 and 3 mm, each with the same laws; at least one.
+/// `results` of the gels of 1, 2 and 3 mm, each with the same laws; at least one.
 [[nodiscard]] std::vector<Row> compare(const std::vector<Result>& results);
 
 /// One table; remarks only where a row disagrees.

@@ -20,7 +20,7 @@ constexpr double kBallRadius_mm = 2;
 constexpr double kPillarRadius_mm = 0.5;
 constexpr int kShrink = 3;  // the study's 640 of 1920 pixels
 
-/// Presses by gel: what is solved once serves all optics.
+/// Presses by gel: a press that is solved once serves all optics.
 class Presses {
  public:
   std::vector<Darkening> photographed(const hal::sim::Scene& sensor, const std::string& what,
@@ -51,7 +51,8 @@ void measure_shapes(const Specimen& specimen, Presses& presses, Result& result) 
   const auto balls = presses.photographed(sensor, "ball", ball);
   const auto cylinders = presses.photographed(sensor, "cylinder", cylinder);
   const auto cubes = presses.photographed(sensor, "cube", cube);
-  // Where noise speckles what is hardly darker than the threshold, the radius would be the noise's.
+  // Where noise adds specks to parts hardly darker than the threshold, it would determine the
+  // radius.
   const auto smooth_balls = presses.photographed(sensor, "ball", ball, kShrink);
   const auto smooth_cylinders = presses.photographed(sensor, "cylinder", cylinder, kShrink);
   const StudyLut lut = list_of(balls, kBallZero_mm);

@@ -12,10 +12,10 @@
 namespace dtact::study {
 
 inline constexpr std::array<double, 6> kDepths_mm = {0.1, 0.2, 0.3, 0.4, 0.5, 0.6};
-/// The zero of a ball that the study found from forces lies this much below the surface (median of
-/// 17 units, ± 0.029): its balls were pressed deeper than it says by as much.
+/// The zero of a ball that the study found from forces is this far below the surface (median of
+/// 17 units, ± 0.029): its balls were pressed deeper than it states by this.
 inline constexpr double kBallZero_mm = 0.155;
-/// What the study's radii and means are measured above, grey levels.
+/// Threshold of the study's radii and means, grey levels.
 inline constexpr int kThreshold = 5;
 
 /// A simulated sensor that goes through the study.
@@ -24,8 +24,8 @@ struct Specimen {
   hal::sim::Scene sensor;
 };
 
-/// The built-in sensor on gels of that thickness: light and widths scaled with it
-/// (thickness::sensor_of), and with the widths it has on 2 mm; one that scatters as sensor_c; and
+/// The built-in sensor on gels of that thickness: with light and widths scaled with it
+/// (thickness::sensor_of), and with the widths it has on 2 mm; one that scatters like sensor_c; and
 /// the other law.
 [[nodiscard]] std::vector<Specimen> specimens(double thickness_mm);
 
@@ -33,7 +33,7 @@ struct Specimen {
 struct Rung {
   double depth_mm = 0;  ///< The ball is kBallZero_mm deeper.
   FlatReading cylinder;
-  FlatReading cylinder_uncorrected;  ///< By a LUT that does not know of the ball's zero.
+  FlatReading cylinder_uncorrected;  ///< By a LUT without correction of the ball's zero.
   FlatReading cube;
   Patch ball_patch;
   Patch cylinder_patch;
@@ -45,10 +45,10 @@ struct PillarPress {
   double tilt_deg = 0;
   double depth_mm = 0;
   Pillars seen;                     ///< At the camera's resolution.
-  std::optional<Pillars> averaged;  ///< On 3 × 3 pixels averaged: less noise. Upright ones.
+  std::optional<Pillars> averaged;  ///< On 3 × 3 pixels averaged, with less noise; upright only.
 };
 
-/// What to press, for tests to ask for less.
+/// Presses to measure; tests use fewer.
 struct Protocol {
   bool shapes = true;
   std::vector<double> spacings_mm = {1.10, 1.25, 1.50, 1.75, 2.00, 2.50};
@@ -58,7 +58,7 @@ struct Protocol {
   std::vector<double> leaning_depths_mm = {0.1, 0.2, 0.3};
 };
 
-/// One specimen's way through the study.
+/// Results of one specimen in the study.
 struct Result {
   std::string law;
   double thickness_mm = 0;
@@ -70,7 +70,7 @@ struct Result {
   [[nodiscard]] int resolved_of_four(double tilt_deg) const;
 };
 
-/// Specimens on the same gel share its presses: results come in their order.
+/// Measures specimens; those on the same gel share its presses. Results come in their order.
 [[nodiscard]] std::vector<Result> measure(const std::vector<Specimen>& specimens,
                                           const Protocol& protocol = {});
 

@@ -1,4 +1,4 @@
-// The simulator run through a study of real sensors, beside what the study reports.
+// Runs the simulator through a study of real sensors and prints its figures beside the study's.
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -25,7 +25,7 @@ int main(int argc, char** argv) {
     std::vector<std::string> laws;
     for (const double gel : figures::kGelThicknesses_mm) {
       const std::vector<Specimen> all = specimens(gel);
-      // The other law has contacts of its own; it is pressed upright alone.
+      // The other law has contacts of its own; it is pressed upright only.
       for (auto& result : measure({all[0], all[1], all[2]})) results.push_back(std::move(result));
       for (auto& result : measure({all[3]}, {.tilts_deg = {}}))
         results.push_back(std::move(result));

@@ -34,7 +34,7 @@ TEST(Reading, PillarsAreJudgedByTheWeaker) {
     if (std::hypot(x - 1, y) < 0.5) return 20.0;
     return std::hypot(x + 1, y) < 0.5 ? 10.0 : 2.0;
   });
-  // The centroid of what exceeds 4 levels lies at 0.45 mm, on the stronger pillar's side; from
+  // The centroid of the part above 4 levels is at 0.45 mm, on the stronger pillar's side; from
   // there the stronger reaches from 0.05 mm on and the weaker ends at −0.95 mm.
   const Pillars pillars = read_pillars(image, 2.0);
   EXPECT_NEAR(pillars.symmetry, 0.5, 0.05);
@@ -105,7 +105,7 @@ TEST(Bench, AskewIsDeeperOnTheRight) {
   EXPECT_GT(leaning.height_mm(0, 0), 100);
 }
 
-// A small part of the study. On the built-in sensor pillars 2 mm apart are distinguished, 1.1 mm
+// A small part of the study. On the built-in sensor pillars 2 mm apart are resolved, 1.1 mm
 // not; leaning ones have a weaker side, and merge first where they are shallow.
 TEST(Study, PillarsOnTwoMillimetres) {
   const Protocol protocol{.shapes = false,

@@ -18,7 +18,7 @@ inline constexpr int kCropCol = (kFrameWidth - kCrop) / 2;
 inline constexpr int kCropRow = (kFrameHeight - kCrop) / 2;
 inline constexpr double kMmPerPx = 24.0 / kCrop;
 
-/// What the paper prints for a column of its table "MAE on testing images", millimetres; the
+/// The paper's figures for a column of its table "MAE on testing images", millimetres; the
 /// standard deviation of the reference image in grey levels.
 struct Published {
   double deviation = 0;
@@ -37,8 +37,8 @@ struct Configuration {
   std::string_view name;
   std::string_view scheme;  ///< A name of net::scheme_leds().
   hal::sim::Arrangement arrangement = hal::sim::Arrangement::ring;
-  /// Relative to all LEDs of the ring: half of the LEDs are exposed twice as long, so that the
-  /// reference image is as bright.
+  /// Exposure relative to all LEDs of the ring: half of the LEDs are exposed twice as long, so that
+  /// the reference image is as bright.
   double exposure = 1;
   /// The paper moved it to the upper right corner for scheme 4.
   RegressionCentre regression_centre;
@@ -48,7 +48,7 @@ struct Configuration {
 /// The paper's five, then the side-lit one.
 [[nodiscard]] std::span<const Configuration> configurations();
 
-/// `base` lit that way.
+/// `base` under the configuration's light.
 [[nodiscard]] hal::sim::Scene lit(hal::sim::Scene base, const Configuration& configuration);
 [[nodiscard]] hal::Light light_of(const Configuration& configuration);
 

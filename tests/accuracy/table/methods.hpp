@@ -13,7 +13,7 @@
 
 namespace dtact::table {
 
-/// The images a calibration is made from.
+/// The images from which a calibration is made.
 struct Material {
   const Trial* trial = nullptr;  ///< For the balls' radii.
   RegressionCentre regression_centre;
@@ -22,18 +22,18 @@ struct Material {
   std::vector<std::vector<image::Grey8>> many;  ///< The presses anywhere.
 };
 
-/// "We average images within a small time window": the number for each press, and for the
+/// "We average images within a small time window": the number of images for each press, and for the
 /// reference.
 inline constexpr std::size_t kPressFrames = 8;
 inline constexpr std::size_t kReferenceFrames = 32;
 
 [[nodiscard]] Material gather(Sensor& sensor, const Trial& trial, const RegressionCentre& centre);
 
-/// From the known sphere alone: from the press near the centre, and from those anywhere.
+/// LUTs from the known sphere only: from the press near the centre, and from those anywhere.
 [[nodiscard]] std::shared_ptr<const recon::Model> alone_single(const Material& material);
 [[nodiscard]] std::shared_ptr<const recon::Model> alone_many(
     const Material& material, calibration::PressReport* report = nullptr);
-/// Made by the default method of dtact-calibrate.
+/// Calibrations of dtact-calibrate's default method.
 [[nodiscard]] std::shared_ptr<const recon::Model> ours_single(const Material& material);
 [[nodiscard]] std::shared_ptr<const recon::Model> ours_many(const Material& material);
 

@@ -20,7 +20,7 @@ class Sensor {
   Sensor(const std::shared_ptr<const hal::sim::Truth>& truth, const Configuration& configuration,
          std::uint64_t seed);
 
-  /// Frame `sequence` as the daemon would get it.
+  /// Frame `sequence`, decoded like in the daemon.
   [[nodiscard]] image::Grey8 frame(std::uint64_t sequence);
   /// `count` frames of press `index`, at most kStillFrames.
   [[nodiscard]] std::vector<image::Grey8> press(std::size_t index, std::size_t count);

@@ -17,7 +17,7 @@
 namespace dtact::table {
 namespace {
 
-// A test press as it is judged: one frame, as the daemon sees it.
+// A judged test press: one frame, decoded like in the daemon.
 struct Test {
   image::Grey8 frame;
   calibration::Circle circle;
@@ -34,7 +34,7 @@ std::vector<Test> photograph(Sensor& sensor, const Trial& trial, const image::Gr
   return tests;
 }
 
-// The least, mean and greatest over seeds of what `value` reads off the cells of one place.
+// The least, mean and greatest over seeds of `value` of the cells of one place.
 struct Spread {
   double mean = 0;
   double least = INFINITY;

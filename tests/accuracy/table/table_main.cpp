@@ -29,7 +29,7 @@ std::vector<Cell> run_all(int seeds, int threads, std::size_t columns) {
       try {
         const auto trial = dtact::table::draw(i + 1);
         trials[i] = dtact::table::run_trial(trial, columns);
-        // One row that no method's model can have made.
+        // One row on a sensor that fits no method's model.
         const auto other = dtact::table::run_trial(trial, 1, dtact::table::Law::another);
         trials[i].insert(trials[i].end(), other.begin(), other.end());
         fmt::print(stderr, "seed {} done\n", i + 1);

@@ -47,7 +47,7 @@ double mean_of(std::string_view method, const Value& value) {
 double circle(const Cell& cell) { return cell.circle.mean_mm(); }
 double indentation(const Cell& cell) { return cell.indentation.mean_mm(); }
 
-// The simulator is to be believed only as far as the published method errs in it as it does on the
+// The simulator is trusted only as far as the published method errs in it like on the
 // paper's sensor: 0.0476 mm with all LEDs, within 30 %.
 TEST(Table, PublishedMethodErrsAsInThePaper) {
   EXPECT_NEAR(mean_of("published single image", circle), 0.0476, 0.3 * 0.0476);
@@ -59,14 +59,14 @@ TEST(Table, TheSphereAloneIsBetterThanThePublishedMethodByBothTruths) {
             0.6 * mean_of("published single image", indentation));
 }
 
-// By the true one: the circle's truth is zero where the gel is still pressed.
+// Judged by the true indentation: the circle's truth is zero where the gel is still pressed.
 TEST(Table, OursIsFarBetterByTheTrueIndentation) {
   EXPECT_LT(mean_of("ours, one press", indentation),
             0.25 * mean_of("published single image", indentation));
   EXPECT_LT(mean_of("ours, one press", indentation), 0.020);
 }
 
-// Its press is the same, its light and its gel are not.
+// Its press is the same; its light and gel differ.
 TEST(Table, AnotherLawHasARowOfItsOwn) {
   std::vector<Cell> both = cells();
   const auto other =

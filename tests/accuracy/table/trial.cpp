@@ -50,7 +50,7 @@ Trial draw(std::uint64_t seed, const Protocol& protocol) {
 std::shared_ptr<const hal::sim::Truth> solve(const hal::sim::Scene& base,
                                              const std::vector<BallPress>& presses) {
   hal::sim::Scene scene = base;
-  scene.gel.solve_step_mm = 5;  // only the presses at rest are looked at
+  scene.gel.solve_step_mm = 5;  // only presses at rest are judged
   scene.loop_from_s = scene.loop_to_s = 0;
   scene.presses.clear();
   scene.faults.clear();

@@ -17,7 +17,7 @@ struct BallPress {
   double depth_mm = 0;
 };
 
-/// How many presses the paper takes, and of which balls.
+/// Number of presses in the paper, and the balls.
 struct Protocol {
   int calibration_presses = 30;
   int test_presses = 20;
@@ -25,10 +25,10 @@ struct Protocol {
   double test_radius_mm = 5.0;
 };
 
-/// The presses of one repetition. Nobody pushes a ball by hand to a set depth, so depths are drawn
+/// The presses of one repetition. A ball pushed by hand reaches no set depth, so depths are drawn
 /// as well: 1.3 to 1.6 mm near the centre, where the LUT should reach far, 0.3 to 1.2 mm anywhere
-/// to calibrate, 0.4 to 1.4 mm to test. The paper says nothing of depths; the middle range was
-/// chosen so that the published regression errs as much as it did there (from 0.5 to 1.6 mm it errs
+/// to calibrate, 0.4 to 1.4 mm to test. The paper states no depths; the middle range was
+/// chosen so that the published regression errs as much as there (from 0.5 to 1.6 mm it errs
 /// a third less). "Anywhere" keeps the contact in the crop: up to 8 mm from the centre on either
 /// axis. The same seed draws the same presses.
 struct Trial {

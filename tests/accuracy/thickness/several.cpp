@@ -35,7 +35,7 @@ table::Trial draw(std::uint64_t seed, double thickness_mm, const table::Protocol
   return trial;
 }
 
-/// A reconstructor, and what it reads of one frame.
+/// A reconstructor and its map of one frame.
 class Reader {
  public:
   explicit Reader(std::shared_ptr<const recon::Model> model)
@@ -54,7 +54,7 @@ class Reader {
   std::vector<std::int16_t> depth_;
 };
 
-/// What the LUT states for a depth, linear between its rows as in the daemon, millimetres.
+/// The LUT's uncertainty at a depth, linear between its rows like in the daemon, millimetres.
 double stated_mm(const recon::Model& model, double depth_mm) {
   recon::Model::Uncertainty below = model.uncertainty.front();
   for (const auto& row : model.uncertainty) {

@@ -8,7 +8,7 @@
 
 namespace dtact::thickness {
 
-/// What a sensor differs in from the built-in one.
+/// Differences of a sensor from the built-in one.
 struct Specimen {
   double thickness_mm = 2.0;
   double taper_x = 0;             ///< Taper of the thickness, per mm.
@@ -17,11 +17,11 @@ struct Specimen {
 
 /// The LUT from thirty presses of a 4 mm ball and that from one, judged on twenty presses of a
 /// 5 mm ball and on a flat disc of 10 mm radius pressed 0.25 mm deep, against the simulator's
-/// indentation where they touch. Presses are those of the table, at most 0.85 of the gel deep.
+/// indentation in contact. Presses are those of the table, at most 0.85 of the gel deep.
 struct SeveralPresses {
   Specimen specimen;
   std::uint64_t seed = 0;
-  /// The one chosen; "refused" where the presses show no LUT (too light for a thick gel), and
+  /// The chosen gain; "refused" where the presses show no LUT (too light for a thick gel), and
   /// then nothing else is measured.
   std::string gain;
   double several_mm = 0;  ///< Mean absolute error under the 5 mm ball.

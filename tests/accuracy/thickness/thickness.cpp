@@ -74,7 +74,7 @@ class Bench {
             table::configurations()[0], 1};
   }
 
-  /// One frame, as the daemon gets it, into depth_.
+  /// Converts one frame, decoded like in the daemon, into depth_.
   table::TruePress look(const hal::sim::Object& object, double depth_mm) {
     auto sensor = sensor_with(object, depth_mm);
     auto luma = sensor.frame(kPressed + kFrames).pixels;
@@ -138,7 +138,7 @@ Result measure(double thickness_mm) {
   for (const double pitch : kPitches) {
     result.grooves.push_back(bench.groove(pitch, std::min(0.6, 0.5 * thickness_mm)));
   }
-  // The simulator's objects reach 0.9 of the gel at most.
+  // The simulator's objects reach at most 0.9 of the gel.
   const double most = 0.9 * thickness_mm;
   for (int tenths = 4; 0.1 * tenths < most; ++tenths) {
     result.presses.push_back(bench.press(0.1 * tenths));

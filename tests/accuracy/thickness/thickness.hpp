@@ -9,15 +9,15 @@
 
 namespace dtact::thickness {
 
-/// The thicknesses the paper made, millimetres.
+/// Gel thicknesses in the paper, millimetres.
 inline constexpr std::array<double, 5> kThicknesses = {1.0, 1.5, 2.0, 2.5, 3.0};
 
-/// How a groove is judged. A plate of 6 mm with square ridges half a pitch wide is pressed in until
-/// the ridges are `depth` deep; the grooves are 0.4 mm deep or as deep as the press. What the depth
-/// map shows is the difference between its mean over the ridges' middles and that over the
-/// grooves', across the middle of the plate, as a share of the same difference in the true surface.
-/// A pitch is resolved while that share is at least a half and the difference is at least 0.02 mm,
-/// which is above noise and LUT.
+/// Criterion for a groove. A plate of 6 mm with square ridges half a pitch wide is pressed in until
+/// the ridges are `depth` deep; the grooves are 0.4 mm deep or as deep as the press. Contrast is
+/// the difference between the depth map's mean over the ridges' middles and that over the grooves',
+/// across the middle of the plate, as a share of the same difference in the true surface. A pitch
+/// is resolved while that share is at least a half and the difference is at least 0.02 mm, which is
+/// above noise and LUT.
 struct Groove {
   double pitch_mm = 0;
   double true_mm = 0;   ///< Ridge minus groove, in the gel's surface.
@@ -27,8 +27,8 @@ struct Groove {
   }
 };
 
-/// How a press is judged: a ball of 5 mm radius. Measured while the mean error where it touches is
-/// at most a tenth of its depth and under 5 % of its pixels are marked untrusted.
+/// Criterion for a press of a ball of 5 mm radius: measured while the mean error in contact is at
+/// most a tenth of its depth and under 5 % of its pixels are untrusted.
 struct Press {
   double depth_mm = 0;
   double error_mm = 0;
@@ -48,13 +48,13 @@ struct Result {
   [[nodiscard]] std::optional<double> deepest_mm() const;
 };
 
-/// The simulated sensor with a gel of another thickness, no contact. The fitted optics
-/// belong to 2 mm: the width of the scattering is scaled with the thickness, and the share of light
-/// that a press takes with the share of the thickness that it takes. Neither was measured on a real
-/// gel of another thickness.
+/// The simulated sensor with a gel of another thickness, no contact. The fitted optics are for 2
+/// mm: the width of the scattering is scaled with the thickness, and the share of light that a
+/// press blocks with its share of the thickness. Neither was measured on a real gel of another
+/// thickness.
 [[nodiscard]] hal::sim::Scene sensor_of(double thickness_mm);
 
-/// Calibrates the simulated sensor with that gel by one press of a 4 mm ball, 0.85 of the
+/// Calibrates the simulated sensor with that gel from one press of a 4 mm ball, 0.85 of the
 /// thickness deep, and measures.
 [[nodiscard]] Result measure(double thickness_mm);
 

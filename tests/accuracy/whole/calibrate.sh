@@ -1,10 +1,10 @@
 #!/usr/bin/env bash
 # Calibrates the simulated sensor as a user does, through the programs: calibrate.sh BUILD KIND FOLDER.
-# BUILD: where the programs were built. FOLDER is left as it is when it is newer than the programs. KIND:
+# BUILD: where the programs were built. FOLDER is kept when it is newer than the programs. KIND:
 #   one_press    one press of a ball of 4 mm radius, as ./dev run makes it
 #   six_presses  six of the presses that a guided calibration asks for
-#   lens         one press through a lens with barrel distortion, which a board of pins told
-#   sphere, cylinder  one_press, with the shape of a finger of 30 mm of radius written into it
+#   lens         one press through a lens with barrel distortion, measured with a board of pins
+#   sphere, cylinder  one_press, plus the surface model of a finger with a radius of 30 mm
 set -euo pipefail
 source=$(dirname "$(readlink -f "$0")")/../../..
 build=$1 kind=$2 folder=$3
@@ -13,12 +13,12 @@ calibrate=$build/clients/dtact-calibrate render=$build/hal/sim/dtact-sim-render
 work=$folder.work
 rm -rf "$folder" "$work" && mkdir -p "$work"
 
-# images SCENE FIRST NAME: 32 frames.
+# images SCENE FIRST NAME: renders 32 frames.
 images() {
   "$render" --scene "$1" --frames "$2:$(($2 + 32))" -o "$work/$3"
 }
 
-# depth OPTION...
+# depth OPTION...: runs dtact-calibrate depth
 depth() {
   "$calibrate" depth --reference "$work/reference" --radius-mm 4.0 --centre 400,300 --crop 580,580 \
     -o "$folder" "$@"

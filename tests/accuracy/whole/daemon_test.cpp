@@ -1,4 +1,4 @@
-// The program in one process sends what the daemon sends.
+// The whole program in one process sends the same as the daemon.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -59,7 +59,7 @@ Difference difference(const v1::DepthMap& a, const v1::DepthMap& b) {
   return found;
 }
 
-// Both see the same camera frames, noise included. The reference may be the mean of others.
+// Both process the same camera frames, noise included. Their references may average other frames.
 TEST(Program, SendsTheDaemonsDepth) {
   const e2e::TempFolder folder;
   const std::filesystem::path scene = folder.path() / "scene.toml";

@@ -14,8 +14,8 @@
 namespace dtact::whole {
 namespace {
 
-/// Truly pressed so far that a contact at rest has to be told: deeper than the threshold by twice
-/// what is stated.
+/// A contact at rest with this area deeper than the threshold plus twice the uncertainty must be
+/// reported.
 constexpr double kSurelyMm2 = 1;
 bool surely_pressed(const FrameErrors& frame) {
   return frame.true_area > kSurelyMm2 &&
@@ -120,7 +120,7 @@ std::string to_markdown(const std::vector<SceneReport>& scenes) {
   fmt::format_to(
       to,
       "\n{} of {} judged frames have a flag and are left out above and below.\n\nContact: {} of {} "
-      "frames without an object say \"touching\"; {} of {} frames "
+      "frames without an object report contact; {} of {} frames "
       "at rest that reach deeper than the threshold by twice what is stated do not.\n",
       contacts.flagged, judged, contacts.false_contacts, contacts.no_contact_frames,
       contacts.missed, contacts.contact_frames);
@@ -166,7 +166,7 @@ std::string to_markdown(const std::vector<SceneReport>& scenes) {
 std::string to_csv(const std::vector<SceneReport>& scenes) {
   std::string out =
       "scene,light,thickness_mm,calibrated_mm,sequence,phase,stated,inside,beside,away,untrusted,"
-      "touching,pressed,true_area,area,centroid,deepest,true_deepest,points,points_95,force,"
+      "in_contact,pressed,true_area,area,centroid,deepest,true_deepest,points,points_95,force,"
       "true_force,stated_force,health,what\n";
   for (const SceneReport& scene : scenes) {
     for (const FrameErrors& f : scene.frames) {

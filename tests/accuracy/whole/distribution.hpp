@@ -8,23 +8,23 @@
 
 namespace dtact::whole {
 
-/// What many values of one kind are like.
+/// Statistics of many values of one kind.
 struct Distribution {
   std::size_t count = 0;
   double median = 0;
   double p95 = 0;
   double max = 0;
-  double above_1 = 0;  ///< Share of them, …
-  double above_2 = 0;  ///< … what is stated being 1.
+  double above_1 = 0;  ///< Share of values above 1, …
+  double above_2 = 0;  ///< … and above 2, in units of the stated error.
 };
 
-/// NaN are left out.
+/// Leaves NaN out.
 [[nodiscard]] Distribution distribution_of(std::vector<double> values);
 
-/// A quantity of every judged frame; a function of it or its ratio to what is stated.
+/// A quantity of every judged frame: a function of it, or its ratio to the stated uncertainty.
 struct Quantity {
   const char* name;
-  const char* unit;  ///< "": a ratio to what is stated.
+  const char* unit;  ///< "": a ratio to the stated uncertainty.
   double (*value)(const FrameErrors& frame);
 };
 [[nodiscard]] const std::vector<Quantity>& quantities();
@@ -32,13 +32,13 @@ struct Quantity {
 [[nodiscard]] Distribution distribution_of(const std::vector<SceneReport>& scenes,
                                            std::string_view name);
 
-/// Frames that report contact where there is none, and resting contacts that are not reported.
+/// Frames that report contact where none exists, and resting contacts that are not reported.
 struct ContactMistakes {
   int false_contacts = 0;
   int no_contact_frames = 0;
   int missed = 0;
   int contact_frames = 0;
-  int flagged = 0;  ///< Left out.
+  int flagged = 0;  ///< Flagged frames, not judged.
 };
 [[nodiscard]] ContactMistakes contact_mistakes(const std::vector<SceneReport>& scenes);
 

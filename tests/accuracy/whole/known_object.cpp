@@ -15,7 +15,7 @@ using hal::sim::kNoSurface;
 
 constexpr double kStep = 0.075;  // mm
 constexpr double kWall = 1.5;
-/// Steeper than this is a wall: mm from one point to the next.
+/// A greater rise is a wall: mm from one point to the next.
 constexpr double kRise = 0.25;
 
 using Height = std::function<double(double, double)>;

@@ -11,7 +11,7 @@ constexpr double kPressSeconds = 1;
 constexpr double kAboveMm = 0.1;
 constexpr std::uint64_t kRestFrames = 6;
 constexpr std::uint64_t kAwayFrames = 30;
-// Off centre, and such that a slide ends as far from it on the other side.
+// Off centre, so that a slide ends equally far on the other side.
 constexpr double kStartXMm = -1.4;
 constexpr double kStartYMm = -0.6;
 constexpr double kSlideDeg = 26;
@@ -47,7 +47,8 @@ PressKey around(double part) {
   return key;
 }
 
-/// Millimetres that it has gone, and by which the gel has been dragged, at a part of the time.
+/// Distance that it has moved and by which it has dragged the gel, millimetres, at a part of the
+/// time.
 struct Stroke {
   double part, mm, drag_mm;
 };
@@ -90,7 +91,7 @@ std::vector<MotionFrames> choreograph(const MovingObject& object,
   const auto frames_of = [fps](double seconds) {
     return static_cast<std::uint64_t>(std::lround(seconds * fps));
   };
-  scene.gel.solve_step_mm = 5;  // a key in every frame does instead
+  scene.gel.solve_step_mm = 5;  // the scene has a key in every frame instead
   auto& keys = scene.presses.at(0).keys;
   keys.clear();
   const auto add = [&](std::uint64_t frame, const PressKey& moved, double depth_mm) {

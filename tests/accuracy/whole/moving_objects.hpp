@@ -10,12 +10,12 @@
 
 namespace dtact::whole {
 
-/// A rigid object, and how it is first pressed in.
+/// A rigid object and its first pose in contact.
 struct MovingObject {
   const char* name;   ///< Name in a file's name.
   const char* lines;  ///< Lines of a scene's press: its shape.
-  double depth_mm;    ///< Where the motions begin.
-  double start_deg;   ///< Its rotation there.
+  double depth_mm;    ///< Depth at the beginning of the motions.
+  double start_deg;   ///< Rotation there.
 };
 inline constexpr std::array kMovingObjects{
     MovingObject{"m3_long_nut", "object = \"m3_long_nut\"", 0.7, 23},
@@ -38,22 +38,22 @@ inline constexpr std::array kMovingObjects{
     MovingObject{"screw_cap", "object = \"screw_cap\"", 0.6, 5},
 };
 
-/// How it moves from there.
+/// A motion from that pose.
 struct ObjectMotion {
   const char* name;
   double seconds;
-  /// By how much of each it has moved at a part, 0 … 1, of that time; `time_s` says nothing.
+  /// How far each value has moved at a part, 0 … 1, of that time; `time_s` is not set.
   hal::sim::PressKey (*moved)(double part);
 };
 
-/// What every object does: turn by 60°, slide by 4 mm, roll by 15°, be pressed 0.3 mm deeper; and
+/// Motions of every object: turn by 60°, slide by 4 mm, roll by 15°, be pressed 0.3 mm deeper; and
 /// all of it at once.
 [[nodiscard]] std::span<const ObjectMotion> common_motions();
-/// `minute`: a loop of twelve seconds, five times, back to where it began. `drag`: the object
-/// sticks, drags the gel along by 0.3 mm, slips and slides on; then it does so back.
+/// `minute`: a loop of twelve seconds, five times, back to its beginning. `drag`: the object
+/// sticks, drags the gel along by 0.3 mm, slips and slides on; then the same backwards.
 [[nodiscard]] std::span<const ObjectMotion> long_motions();
 
-/// Which camera frames of a choreography belong to one motion.
+/// The camera frames of a choreography that belong to one motion.
 struct MotionFrames {
   std::uint64_t first = 0;   ///< The object is above the surface and begins to come down.
   std::uint64_t motion = 0;  ///< The last one before it moves, pressed in and at rest.
@@ -61,7 +61,7 @@ struct MotionFrames {
   std::uint64_t last = 0;    ///< The last one before it is lifted.
 };
 
-/// Frames before the first object comes: enough for the reference.
+/// Frames before the first object: enough for the reference.
 inline constexpr std::uint64_t kReferenceFrames = 60;
 
 /// Gives `scene`, which has one press with any keys, a press for each of `motions`, one after the

@@ -29,8 +29,8 @@ MIN_DEEP_MM = 0.06
 AROUND_MM = 0.25
 STRIDE = 2
 SMOOTH_PX = 2  # normals are of the map averaged over 2 · SMOOTH_PX + 1 pixels, both ways
-PAIRED_MM = 0.3  # points further apart are no pair
-MIN_FITNESS = 0.4  # with fewer of the points in a pair the frame is lost
+PAIRED_MM = 0.3  # points further apart are not paired
+MIN_FITNESS = 0.4  # with a smaller share of paired points the frame is lost
 
 
 def read_frames(file):
@@ -58,7 +58,7 @@ def box_mean(values, radius):
 
 
 def near(mask, radius):
-    """Within `radius` pixels of the mask."""
+    """Pixels within `radius` of the mask."""
     return box_mean(mask.astype(float), radius) > 1e-9
 
 
@@ -112,14 +112,14 @@ def cloud_of(frame):
 
 
 class Icp:
-    """Follows clouds against a keyframe, which is another one where less of it is seen."""
+    """Follows clouds against a keyframe, which is replaced when too little of it is visible."""
 
     def __init__(self, kind, first, rekey, velocity, tukey_mm):
         self.kind = kind
         self.key = first
         self.key_motion = np.eye(4)  # from the first frame to the keyframe
         self.motion = np.eye(4)  # from the first frame to the one before
-        self.step = np.eye(4)  # of the frame before
+        self.step = np.eye(4)  # of the previous frame
         self.rekey = rekey
         self.velocity = velocity
         self.tukey_mm = tukey_mm
@@ -134,7 +134,7 @@ class Icp:
             self.key, cloud, PAIRED_MM, start, registration.TransformationEstimationForGeneralizedICP())
 
     def follow(self, cloud):
-        """Whether it is found; `motion` is the newest that was."""
+        """Returns whether the cloud was found; `motion` is the newest one found."""
         guess = self.step @ self.motion if self.velocity else self.motion
         result = self.register(cloud, guess @ np.linalg.inv(self.key_motion))
         if result.fitness < MIN_FITNESS:
@@ -155,7 +155,7 @@ TRACKERS = {
 
 
 def track(frames, begin, every, options):
-    """Rows of every so many frames, the last one included."""
+    """Rows of every `every`-th frame, including the last."""
     since = frames[begin].sequence
     rows = []
     icp = Icp(first=cloud_of(frames[begin]), **options)
@@ -174,7 +174,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=pathlib.Path)
     parser.add_argument("--only", action="append", default=[], help="sequences whose name holds this")
-    parser.add_argument("--every", type=int, default=1, help="of so many frames one is looked at")
+    parser.add_argument("--every", type=int, default=1, help="judge one of this many frames")
     parser.add_argument("--set", action="append", default=[], metavar="TRACKER:KEY=VALUE",
                         help="try another setting; KEY is rekey, velocity or tukey_mm")
     parser.add_argument("--trackers", default=",".join(TRACKERS))

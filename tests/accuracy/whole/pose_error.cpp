@@ -9,7 +9,8 @@ namespace {
 
 using Twist = Eigen::Matrix<double, 6, 1>;
 
-/// The one twist about `centre` (rotation times `arm`) that going along for a while is `motion`.
+/// The one twist about `centre` (rotation times `arm`) that leads to `motion` when followed for a
+/// time.
 Twist screw_of(const Eigen::Isometry3d& motion, const Eigen::Vector3d& centre, double arm) {
   const Eigen::AngleAxisd turn(motion.rotation());
   const Eigen::Vector3d shift = motion * centre - centre;
@@ -51,7 +52,7 @@ PoseError error_of(const Eigen::Isometry3d& found, const Eigen::Isometry3d& trut
     for (std::size_t i = 0; i < without.size(); ++i) {
       span.col(static_cast<Eigen::Index>(i)) = about(without[i], centre, arm).normalized();
     }
-    // One direction that was found in several frames differs a little from one to the other.
+    // A direction that was found in several frames differs slightly between them.
     constexpr double kAlike = 0.3;
     const Eigen::JacobiSVD<decltype(span)> svd(span, Eigen::ComputeFullU);
     for (Eigen::Index i = 0; i < svd.singularValues().size(); ++i) {

@@ -21,7 +21,7 @@ struct PoseError {
   double mm = 0;
   double deg = 0;
 };
-/// Without its part along `without`. `centre` and `arm`: of the contact.
+/// Without its part along `without`. `centre` and `arm` are the contact's.
 [[nodiscard]] PoseError error_of(const Eigen::Isometry3d& found, const Eigen::Isometry3d& truth,
                                  const Eigen::Vector3d& centre, double arm,
                                  const std::vector<Direction>& without);

@@ -1,9 +1,9 @@
-// Judges poses against the truth on what pose_sequences wrote: dtact-perceive's, made here, and
-// those of other trackers that lie beside the frames as SEQUENCE.TRACKER.track.csv (open3d_icp.py).
-// Prints a line of CSV for each sequence and tracker. Errors are of the motion from the last frame
-// before the object moves, with --known of the object's place, at the contact's centre: `all`,
-// `reported` without the directions that the tracker reports as unobservable, `shape` without those
-// that change no depth (SEQUENCE.shape.csv).
+// Judges poses against the truth in the files of pose_sequences: dtact-perceive's, computed here,
+// and those of other trackers in files SEQUENCE.TRACKER.track.csv beside the frames
+// (open3d_icp.py). Prints a line of CSV for each sequence and tracker. Errors are of the motion
+// from the last frame before the object moves (with --known of the object's pose) at the contact's
+// centre: `all`, `reported` without the directions that the tracker reports as unobservable,
+// `shape` without those that change no depth (SEQUENCE.shape.csv).
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -33,7 +33,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A sequence is followed whose frames are all within these.
+/// A sequence counts as followed when all its frames are within these.
 constexpr double kFollowedMm = 0.3;
 constexpr double kFollowedDeg = 5;
 
@@ -43,7 +43,7 @@ std::array<PoseError, kWays.size()> listed(const PoseErrors& errors) {
   return {errors.all, errors.reported, errors.shape};
 }
 
-/// `part` of 1: the greatest. NaN of nothing.
+/// `part` of 1 is the greatest. NaN without values.
 double part_of(std::vector<double> values, double part) {
   if (values.empty()) return NAN;
   const auto at = values.begin() + std::lround(part * static_cast<double>(values.size() - 1));
@@ -66,7 +66,7 @@ void print_head(bool each_frame) {
 }
 
 /// The first frame of the motion without contact, or the number of frames: an object that rolls on
-/// a curved surface may leave it, and nothing is left to follow.
+/// a curved surface may leave it, and then cannot be followed.
 std::size_t contact_end(const Sequence& sequence) {
   std::size_t at = sequence.begin();
   for (v1::Frame frame; at < sequence.frames.size(); ++at) {
@@ -81,7 +81,7 @@ void print_frames(const Sequence& sequence, const std::string& tracker,
                   const std::vector<TrackRow>& track,
                   const std::function<PoseErrors(const TrackRow&)>& errors_of) {
   for (const TrackRow& row : track) {
-    if (sequence.index(row.sequence) < sequence.begin() || !row.told) continue;
+    if (sequence.index(row.sequence) < sequence.begin() || !row.has_pose) continue;
     std::string line = fmt::format("{},{},{},{},{},{}", sequence.name, tracker, row.sequence,
                                    row.usable ? 1 : 0, row.since, row.unobservable.size());
     for (const PoseError& error : listed(errors_of(row))) {
@@ -111,7 +111,7 @@ void print_row(const Sequence& sequence, const std::string& tracker,
   std::array<std::vector<double>, kWays.size()> deg;
   for (const TrackRow& row : track) {
     if (sequence.index(row.sequence) < sequence.begin()) {
-      lost_in_press += row.told && !row.usable ? 1 : 0;
+      lost_in_press += row.has_pose && !row.usable ? 1 : 0;
       continue;
     }
     if (sequence.index(row.sequence) >= contact_ends) break;
@@ -120,7 +120,7 @@ void print_row(const Sequence& sequence, const std::string& tracker,
     restarts += before != nullptr && row.usable && before->usable && row.since != before->since;
     before = &row;
     end.fill({INFINITY, INFINITY});  // as long as no pose was reported
-    if (!row.told) continue;
+    if (!row.has_pose) continue;
     end = listed(errors_of(row));
     for (std::size_t way = 0; row.usable && way < kWays.size(); ++way) {
       mm.at(way).push_back(end.at(way).mm);
@@ -168,7 +168,7 @@ void judge_motion(const fs::path& folder, const Sequence& sequence, bool each_fr
   }
 }
 
-/// The object's shape comes from a file, as for a user.
+/// The object's shape comes from a file, like a user's.
 void judge_known(const fs::path& folder, const Sequence& sequence, bool each_frame) {
   constexpr double kFps = 60;
   const std::string name = sequence.name.substr(0, sequence.name.find('.'));

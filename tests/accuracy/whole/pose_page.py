@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""pose_page.py RESULTS OUT: the tables of pose_tables.md from what pose_judge printed.
+"""pose_page.py RESULTS OUT: the tables of pose_tables.md from pose_judge's output.
 
 RESULTS holds one_press.csv, six_presses.csv, lens.csv, and as far as they were made sphere.csv,
 cylinder.csv, minute.csv, drag.csv and known.csv.
@@ -27,7 +27,7 @@ def read(folder, name):
 
 
 def error(rows, when, way, part):
-    """As "0.012 mm, 0.05°"; a share `part` of the sequences is no worse."""
+    """As "0.012 mm, 0.05°"; a share `part` of the sequences is at most that."""
     if not rows:
         return "–"
     def at(unit):
@@ -84,7 +84,7 @@ def by(rows, key, keys):
 
 
 def worst(rows, count):
-    """The sequences of dtact-perceive's that were not followed, or ended farthest off."""
+    """Sequences that dtact-perceive did not follow, or that ended with the largest error."""
     mine = sorted(own(rows, "dtact-perceive"),
                   key=lambda row: (row["followed_reported"], -row["lost"] / row["frames"],
                                    -row["end_reported_mm"] - row["end_reported_deg"] / 20))

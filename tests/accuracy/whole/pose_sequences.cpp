@@ -1,5 +1,5 @@
 // Objects that move on the simulated sensor: the frames that the daemon sends to dtact-perceive,
-// and where the objects truly are (sequence.hpp says in which files).
+// and the true poses (sequence.hpp describes the files).
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -31,7 +31,7 @@ struct Arguments {
   fs::path head;  ///< A scene's tables that come before the press; empty: none.
 };
 
-/// Everything when nothing is named.
+/// All names are wanted when none is given.
 bool is_wanted(const std::vector<std::string>& names, const char* name) {
   return names.empty() || std::ranges::find(names, name) != names.end();
 }

@@ -1,5 +1,5 @@
 // Objects that move on the simulated sensor, followed through the whole program with a calibration
-// that its programs made: the short form of what pose.md reports.
+// that its programs made: the short form of pose.md.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -24,7 +24,7 @@ namespace {
 
 using hal::sim::PressKey;
 
-/// One press of a ball; made once for all tests of this build.
+/// A calibration from one press of a ball, made once for all tests of this build.
 std::filesystem::path calibration() {
   std::filesystem::path folder = DTACT_BUILD_DIR "/calibrations/one_press";
   const std::string command = fmt::format("{}/tests/accuracy/whole/calibrate.sh {} one_press {}",
@@ -33,7 +33,7 @@ std::filesystem::path calibration() {
   return folder;
 }
 
-/// An object, what it does within a second, and how far off it may be in any frame.
+/// An object, its motion within a second, and the largest error allowed in any frame.
 struct Case {
   const char* object;
   ObjectMotion motion;
@@ -85,7 +85,7 @@ constexpr ObjectMotion kTurnAndSlide{"turn_and_slide", 1, [](double part) {
                                                        .tilt_x_deg = 3 * part};
                                      }};
 
-// The nut's turn shows in its chamfer alone.
+// Only the nut's chamfer shows its rotation.
 INSTANTIATE_TEST_SUITE_P(Objects, MovingObjectIsFollowed,
                          testing::Values(Case{"m3_long_nut", kTurn, 0.05, 0.5},
                                          Case{"cube", kSlide, 0.05, 0.5},

@@ -17,7 +17,7 @@ namespace {
 
 Eigen::Vector3d vector_of(const v1::Vector3& from) { return {from.x(), from.y(), from.z()}; }
 
-/// Once ObjectPose has it, the field `valid` decides.
+/// The field `valid` decides once ObjectPose is set.
 bool is_usable(const v1::ObjectPose& pose) {
   if (const auto* valid = v1::ObjectPose::descriptor()->FindFieldByName("valid")) {
     return pose.GetReflection()->GetBool(pose, valid);
@@ -30,7 +30,7 @@ TrackRow row_of(const v1::Frame& frame) {
   row.sequence = frame.sequence();
   if (!frame.has_pose()) return row;
   const v1::ObjectPose& pose = frame.pose();
-  row.told = pose.tracking() != v1::ObjectPose::SEARCHING;
+  row.has_pose = pose.tracking() != v1::ObjectPose::SEARCHING;
   row.usable = is_usable(pose);
   row.since = pose.since_sequence();
   const Eigen::Vector3d turn = vector_of(pose.rotation_deg()) * std::numbers::pi / 180;
@@ -44,7 +44,7 @@ TrackRow row_of(const v1::Frame& frame) {
   return row;
 }
 
-/// Where the contact is, as the daemon says.
+/// The contact that the daemon reports.
 struct Contact {
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();
   double arm = 1;
@@ -103,7 +103,7 @@ std::vector<TrackRow> read_track(const std::filesystem::path& csv) {
     fields >> row.sequence >> row.usable >> row.since;
     read_pose(fields, row.motion);
     fields >> row.frame_us;
-    row.told = row.since != 0;
+    row.has_pose = row.since != 0;
   });
   if (rows.empty()) throw std::runtime_error(csv.string() + " has no frames: write it again");
   return rows;

@@ -210,7 +210,7 @@ Program::Program(const std::shared_ptr<const hal::sim::Truth>& truth,
 Program::~Program() { impl_->loop.tracker().stop(); }
 
 std::string Program::next() {
-  impl_->loop.tracker().settle();  // what it finds would else come a frame sooner or later
+  impl_->loop.tracker().settle();  // otherwise its result may come a frame sooner or later
   impl_->loop.step();
   pipeline::Event event;
   while (impl_->exchange.events.pop(event)) {

@@ -16,46 +16,46 @@
 
 namespace dtact::whole {
 
-/// What dtact-perceive asks of the daemon for a client that wants points of the contact and pose:
-/// depth at full resolution, cut to the contact and a margin. Nothing of it without contact.
+/// dtact-perceive's subscription for a client of the contact's points and pose: depth at full
+/// resolution, cut to the contact and a margin. No depth without contact.
 [[nodiscard]] net::FrameKind perceive_kind();
 
-/// The whole map in every frame, as a client gets it that subscribes to depth alone.
+/// The whole map in every frame, for a client that subscribes to depth only.
 [[nodiscard]] net::FrameKind whole_map_kind();
 
 /// Solves the contacts of a scene's text (the keys of config/scenes/default.toml), about 50 ms a
 /// map. Throws std::runtime_error naming the key that is wrong.
 [[nodiscard]] std::shared_ptr<const hal::sim::Truth> solve(std::string_view scene);
 
-/// From the simulator's surface frame to the calibration's, whose origin is the middle of the depth
-/// map, millimetres. They differ where a lens was calibrated: by where the board lay.
+/// Transform from the simulator's surface frame to the calibration's, whose origin is the middle of
+/// the depth map, millimetres. With a calibrated lens they differ by the board's position.
 struct MapFrame {
   Eigen::Isometry3d from_scene;
   double scale = 1;   ///< Millimetres of the map for one of the scene.
-  double rms_mm = 0;  ///< What is left: the error of the lens.
+  double rms_mm = 0;  ///< Residual: the error of the lens.
 };
 [[nodiscard]] MapFrame map_frame(const hal::sim::Scene& scene,
                                  const std::filesystem::path& calibration);
 
-/// What light a frame is exposed in.
+/// Light under which a frame is exposed.
 struct Lighting {
   hal::sim::LedLevels leds = hal::sim::led_levels({});
   double gain = 1;  ///< Factor on the brightness, 0.25 … 4.
 };
 
-/// What the program runs with. Default: a daemon without a configuration.
+/// Settings of the program. Default: a daemon without a configuration.
 struct Settings {
   pipeline::PipelineConfig daemon;
   net::FrameKind kind = perceive_kind();
   std::uint64_t seed = 1;        ///< Seed of the camera's noise.
-  std::string output = "mjpeg";  ///< What the camera delivers: "luma", "yuyv" or "mjpeg".
+  std::string output = "mjpeg";  ///< The camera's format: "luma", "yuyv" or "mjpeg".
   /// Light of each frame; none: all LEDs as the ring shows them.
   std::function<Lighting(std::uint64_t sequence)> lighting;
 };
 
 /// The simulated camera, the daemon's capture loop and its frame encoder in one thread and in the
-/// camera's own time: the same truth and settings give the same depth. The ring shows what it shows
-/// at start. The reference is taken in the first 45 frames, which must be contact-free.
+/// camera's own time: the same truth and settings give the same depth. The ring keeps its light
+/// from the start. The reference is taken in the first 45 frames, which must be contact-free.
 class Program {
  public:
   /// Throws std::runtime_error when `calibration`, a folder, cannot be read, and
@@ -69,7 +69,7 @@ class Program {
   /// The next camera frame, whose sequence is the scene's (0, 1, …), as the serialised v1::Frame of
   /// Settings::kind.
   [[nodiscard]] std::string next();
-  /// The same frame as a client of another kind gets it.
+  /// The same frame for a client of another kind.
   [[nodiscard]] std::string as(const net::FrameKind& kind);
   /// The same frame as the capture loop publishes it: depth in micrometres, contact, health.
   [[nodiscard]] const pipeline::DepthFrame& frame() const;

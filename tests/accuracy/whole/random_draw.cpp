@@ -20,7 +20,7 @@ namespace sim = hal::sim;
 
 constexpr double kShallowestMm = 0.05;
 constexpr double kMaxShare = 0.8;
-constexpr double kBeginS = 0.8;  // the reference is there by then
+constexpr double kBeginS = 0.8;  // the reference is taken by then
 constexpr double kAboveMm = 0.1;
 
 /// Draws that are the same with every standard library.
@@ -42,7 +42,7 @@ class Draw {
   std::mt19937_64 engine_;
 };
 
-/// Numbers that lie close together give seeds that do not.
+/// Similar numbers give seeds that differ much.
 std::uint64_t seed_of(std::uint64_t seed, int number) {
   std::seed_seq sequence{static_cast<std::uint32_t>(seed), static_cast<std::uint32_t>(seed >> 32U),
                          static_cast<std::uint32_t>(number)};
@@ -235,7 +235,7 @@ void draw_presses(RandomScene& out, Draw& draw) {
   SceneWriter scene(out, draw);
   const double kind = draw.uniform(0, 1);
   if (kind < 0.05) {
-    out.what = "untouched";
+    out.what = "no contact";
     for (const double seconds : {1.5, 2.5}) scene.judge(seconds, Phase::after);
     return;
   }
@@ -425,7 +425,7 @@ RandomScene draw_scene(const RandomSensor& sensor, int number) {
 
 std::shared_ptr<const hal::sim::Truth> solve_eased(RandomScene& scene) {
   constexpr double kEase = 0.7;
-  constexpr double kSlideStepMm = 0.2;  // blended contacts lie beside each other else
+  constexpr double kSlideStepMm = 0.2;  // a larger step would blend contacts beside each other
   const bool slides = std::ranges::any_of(
       scene.judged, [](const JudgedFrame& frame) { return frame.phase == Phase::slide; });
   if (slides) scene.scene.gel.solve_step_mm = kSlideStepMm;

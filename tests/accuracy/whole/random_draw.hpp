@@ -11,16 +11,16 @@
 
 namespace dtact::whole {
 
-/// A simulated sensor of its own gel, optics, light and camera, without presses.
+/// A simulated sensor with its own gel, optics, light and camera, without presses.
 struct RandomSensor {
   std::string name;  ///< "s03".
   std::uint64_t seed = 0;
   hal::sim::Scene scene;
-  /// A user has to measure the lens: the camera distorts.
+  /// The camera distorts, so a user has to measure the lens.
   [[nodiscard]] bool has_lens() const noexcept { return scene.camera.barrel > 0; }
 };
 
-/// How the light differs from that of the calibration.
+/// Difference of the light from the calibration's.
 enum class LightCase : std::uint8_t {
   same,
   brighter,  ///< Another brightness of the whole field, from the start.
@@ -30,7 +30,7 @@ enum class LightCase : std::uint8_t {
 };
 [[nodiscard]] const char* name_of(LightCase light) noexcept;
 
-/// What a judged frame shows.
+/// State of the object in a judged frame.
 enum class Phase : std::uint8_t { before, moving, rest, slide, after };
 [[nodiscard]] const char* name_of(Phase phase) noexcept;
 
@@ -39,10 +39,10 @@ struct JudgedFrame {
   Phase phase = Phase::before;
 };
 
-/// What happens on one sensor.
+/// A scene on one sensor.
 struct RandomScene {
   std::string name;  ///< "s03.11".
-  std::string what;  ///< Objects, sizes, depths, motion and light in words.
+  std::string what;  ///< Description: objects, sizes, depths, motion and light.
   std::uint64_t seed = 0;
   hal::sim::Scene scene;
   LightCase light = LightCase::same;
@@ -50,13 +50,13 @@ struct RandomScene {
   std::vector<JudgedFrame> judged;  ///< Ascending.
 };
 
-/// Sensor `number` of those that `seed` draws.
+/// Draws sensor `number` of `seed`.
 [[nodiscard]] RandomSensor draw_sensor(std::uint64_t seed, int number);
 
-/// Scene `number` on a sensor. Depth reaches 0.8 of the gel.
+/// Draws scene `number` on a sensor. Depth reaches 0.8 of the gel.
 [[nodiscard]] RandomScene draw_scene(const RandomSensor& sensor, int number);
 
-/// Solves its contacts, with all presses made shallower until no more than kMaxNewtons press.
+/// Solves the scene's contacts, with all presses made shallower until at most kMaxNewtons press.
 [[nodiscard]] std::shared_ptr<const hal::sim::Truth> solve_eased(RandomScene& scene);
 inline constexpr double kMaxNewtons = 30;
 

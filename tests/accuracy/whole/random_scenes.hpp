@@ -18,8 +18,8 @@ struct RandomRun {
   std::filesystem::path folder;  ///< Folder of calibrations; an existing one is used.
 };
 
-/// Draws sensors, calibrates each, and judges scenes on it. What a sensor's calibration printed
-/// lies beside its folder. Prints a line for each scene.
+/// Draws sensors, calibrates each, and judges scenes on it. The output of a sensor's calibration is
+/// beside its folder. Prints a line for each scene.
 [[nodiscard]] std::vector<SceneReport> run(const RandomRun& wanted);
 
 }  // namespace dtact::whole

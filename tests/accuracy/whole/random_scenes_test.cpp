@@ -1,5 +1,5 @@
-// The short form of the random scenes: what clients get of twelve of them, held against bounds from
-// the distribution over two hundred (README.md). Its seed had no part in any constant.
+// The short form of the random scenes: the frames of twelve of them are held against bounds from
+// the distribution over two hundred (README.md). No constant was chosen with this seed.
 #include "tests/accuracy/whole/random_scenes.hpp"
 
 #include <gmock/gmock.h>
@@ -64,7 +64,7 @@ TEST(RandomScenes, NoHealthFlagIsRaisedWithoutCause) {
     }
     early += scene.false_alarms.at(kBeyond) > 0 ? 1 : 0;
   }
-  EXPECT_LE(early, 2);  // 4 of 200: at the lookup table's end depth reads too deep there
+  EXPECT_LE(early, 2);  // 4 of 200: at the end of the lookup table depth reads too deep
 }
 
 }  // namespace

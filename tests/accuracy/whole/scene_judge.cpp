@@ -20,7 +20,7 @@ namespace {
 constexpr double kContactMm = pipeline::ContactRules{}.threshold_mm;
 constexpr double kContactMm2 = pipeline::ContactRules{}.area_mm2;
 
-/// A mean of absolute values; NaN without any.
+/// Mean of absolute values; NaN without any.
 class MeanError {
  public:
   void add(double error) {
@@ -34,7 +34,7 @@ class MeanError {
   int count_ = 0;
 };
 
-/// What is true at the pixels of the depth map.
+/// The truth at the pixels of the depth map.
 struct TrueMap {
   cv::Mat1f indentation_mm;
   cv::Mat1b in_contact;
@@ -208,11 +208,11 @@ void judge_points(const v1::PointCloud& cloud, const TruthReader& truth, FrameEr
   out.points_95 = *at;
 }
 
-/// Flags that nothing in a scene gives cause for.
+/// Flags without a cause in the scene.
 std::uint32_t without_cause(const RandomScene& scene, double true_deepest, double calibrated_mm) {
   using pipeline::Health;
   pipeline::HealthSet causes;
-  causes.set(Health::not_realtime);     // says nothing of depth
+  causes.set(Health::not_realtime);     // does not concern depth
   causes.set(Health::image_saturated);  // a bulge in bright light is white
   causes.set(Health::light_drifted, scene.light == LightCase::led_fails);
   causes.set(Health::beyond_calibration, true_deepest > 0.9 * calibrated_mm - 0.03);

@@ -13,30 +13,30 @@
 
 namespace dtact::whole {
 
-/// One judged frame, as clients got it beside the truth. Lengths in mm; NaN: nothing to compare.
+/// One judged frame of a client compared with the truth. Lengths in mm; NaN: nothing to compare.
 struct FrameErrors {
   JudgedFrame frame;
   double stated = NAN;     ///< DepthMap.uncertainty_um.
   double inside = NAN;     ///< Mean absolute error in contact, …
-  double beside = NAN;     ///< … within kBesideMm round it, …
+  double beside = NAN;     ///< … within kBesideMm around it, …
   double away = NAN;       ///< … and everywhere else.
   double untrusted = NAN;  ///< Share of the pixels in contact.
   bool in_contact = false;
   bool pressed = false;   ///< An object is in contact, truly and within the map.
-  double true_area = 0;   ///< mm² truly deeper than the contact threshold.
-  double area = NAN;      ///< Said, as a share of the true one, minus 1.
-  double centroid = NAN;  ///< Distance from the true one.
-  double deepest = NAN;   ///< Said minus true.
+  double true_area = 0;   ///< True area deeper than the contact threshold, mm².
+  double area = NAN;      ///< Reported area as a share of the true one, minus 1.
+  double centroid = NAN;  ///< Distance from the true centroid.
+  double deepest = NAN;   ///< Reported minus true.
   double true_deepest = 0;
   double points = NAN;     ///< Mean distance of the contact's points from the true surface, …
   double points_95 = NAN;  ///< … and 95 % within.
-  double force = NAN;      ///< Said minus true, newtons.
+  double force = NAN;      ///< Reported minus true, newtons.
   double true_force = 0;
   double stated_force = NAN;
   std::uint32_t health = 0;  ///< Bits of pipeline::Health.
 
-  /// A flag says that the picture is not what depth is measured by, which no uncertainty covers.
-  /// Pixels deeper than calibrated are untrusted and take nothing from the others.
+  /// A flag reports that the picture is unfit for depth, which no uncertainty covers.
+  /// Pixels deeper than calibrated are untrusted and do not affect the others.
   [[nodiscard]] bool is_flagged() const noexcept;
   /// The stated uncertainty is "inside the contact": NaN where none is reported.
   [[nodiscard]] double inside_ratio() const noexcept { return in_contact ? inside / stated : NAN; }
@@ -53,9 +53,9 @@ struct SceneReport {
   int watched = 0;
   std::array<int, pipeline::kHealthCount> flagged{};
   std::array<int, pipeline::kHealthCount> false_alarms{};
-  int beyond_missed = 0;  ///< Judged frames truly deeper than calibrated that do not say so.
+  int beyond_missed = 0;  ///< Judged frames truly deeper than calibrated without the flag.
 
-  /// The unflagged frame that errs most against its uncertainty: every kMapStep-th pixel,
+  /// The unflagged frame with the largest error against its uncertainty: every kMapStep-th pixel,
   /// micrometres.
   int map_width = 0;
   std::vector<std::int16_t> true_map;

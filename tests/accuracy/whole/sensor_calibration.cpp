@@ -25,7 +25,7 @@ namespace sim = hal::sim;
 
 constexpr double kPeriodS = 1;  // from one press to the next
 constexpr std::uint64_t kContactFree = 32;
-constexpr std::uint64_t kImages = 24;  // of a press that a lookup table or a lens is made from
+constexpr std::uint64_t kImages = 24;  // of a press for a lookup table or a lens
 constexpr std::uint64_t kForceImages = 4;
 constexpr double kNewtonsPerGram = 0.00980665;
 
@@ -36,13 +36,13 @@ struct Load {
   double y_mm = 0;
 };
 
-/// The sensor with loads pressed in one after another, and images of them in folders.
+/// The sensor with loads pressed in one after another, and their images in folders.
 class Bench {
  public:
   Bench(const RandomSensor& sensor, const std::vector<Load>& loads, fs::path folder)
       : renderer_(with(sensor.scene, loads), sensor.seed), folder_(std::move(folder)) {}
 
-  std::string reference_image() { return images("untouched", 0, kContactFree); }
+  std::string reference_image() { return images("no_contact", 0, kContactFree); }
   std::string load(std::size_t index, std::uint64_t count = kImages) {
     return images(fmt::format("load{}", index), frame_of(index), count);
   }
@@ -85,7 +85,7 @@ class Bench {
   fs::path folder_;
 };
 
-/// Runs dtact-calibrate. Returns what it printed.
+/// Runs dtact-calibrate. Returns its output.
 std::string run(const std::vector<std::string>& arguments) {
   std::ostringstream out;
   std::ostringstream error;
@@ -146,7 +146,7 @@ void calibrate_force(const RandomSensor& sensor, const fs::path& work, const fs:
   }
   try {
     printed += run(arguments);
-  } catch (const std::runtime_error& error) {  // the sensor then has no force
+  } catch (const std::runtime_error& error) {  // this sensor has no force calibration
     printed += fmt::format("force refused: {}", error.what());
   }
 }

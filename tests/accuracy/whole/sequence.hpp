@@ -17,7 +17,7 @@
 
 namespace dtact::whole {
 
-/// What is true of a frame. Lengths are millimetres, poses are in the map's surface frame.
+/// The truth of a frame. Lengths are millimetres, poses are in the map's surface frame.
 struct TruthRow {
   std::uint64_t sequence = 0;
   bool in_contact = false;
@@ -30,11 +30,11 @@ struct ShapeRow {
   std::uint64_t sequence = 0;
   Direction direction;
   double shown = 0;  ///< ShownDirection::shown.
-  /// What shows less counts as unobservable.
+  /// Directions that show less count as unobservable.
   static constexpr double kMinShown = 0.05;
 };
 
-/// One object that is pressed in and then moves, as the daemon sends it and as it is.
+/// One object that is pressed in and then moves: the daemon's frames and the truth.
 struct Sequence {
   std::string name;
   std::vector<TruthRow> truth;      ///< One of each frame, their sequences without gaps.
@@ -43,12 +43,11 @@ struct Sequence {
 
   /// The last frame before the object moves.
   [[nodiscard]] std::size_t begin() const;
-  /// The number in `truth` and `frames` of a camera frame.
+  /// Index of a camera frame in `truth` and `frames`.
   [[nodiscard]] std::size_t index(std::uint64_t sequence) const;
-  /// How the object has moved from one frame to another, both numbers in `truth`.
+  /// The object's motion from one frame to another, both indices into `truth`.
   [[nodiscard]] Eigen::Isometry3d motion(std::size_t from, std::size_t to) const;
-  /// The directions that were unobservable in a frame up to this one, where the object has carried
-  /// them.
+  /// The directions that were unobservable in any frame up to this one, moved with the object.
   [[nodiscard]] std::vector<Direction> unobservable(std::size_t at) const;
 };
 

@@ -15,7 +15,7 @@ namespace {
 using hal::sim::PressKey;
 
 constexpr double kStepMm = 0.2;
-/// What is shallower has no part in it.
+/// Shallower pixels do not count.
 constexpr double kMinDeepMm = 0.06;
 constexpr double kMinArmMm = 0.5;
 
@@ -25,7 +25,7 @@ Eigen::Isometry3d pose_at(const hal::sim::Scene& scene, const PressKey& key) {
   return isometry_of(pose_of(scene.surface, scene.presses[0].object, key));
 }
 
-/// The key that puts the object there.
+/// The key that gives the object this pose.
 PressKey key_of(const hal::sim::Scene& scene, const Eigen::Isometry3d& pose) {
   const Eigen::Vector3d up = pose.linear().col(2);
   const auto tilt = Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), up);

@@ -18,10 +18,10 @@ struct ShownDirection {
   double shown = 0;  ///< RMS change of depth over the contact, mm for a mm of motion.
 };
 
-/// Six directions, the least shown first: the principal axes of how the true indentation changes
-/// when the object of the scene's first press is moved, from where it is at frame `sequence`, by
-/// 0.2 mm (rotations: at the contact's edge) and the gel is solved again. Of a curved surface
-/// the plane that touches it stands for it.
+/// Six directions, the least shown first: the principal axes of the change of the true indentation
+/// when the object of the scene's first press is moved, from its pose at frame `sequence`, by
+/// 0.2 mm (rotations: at the contact's edge) and the gel is solved again. A curved surface is
+/// replaced by its tangent plane.
 [[nodiscard]] std::array<ShownDirection, 6> shown_directions(const hal::sim::Scene& scene,
                                                              std::uint64_t sequence);
 

@@ -1,12 +1,12 @@
-// What the depth encodings make of a ball held in contact: bytes and time of every encoding for
+// The depth encodings on a ball held in contact: bytes and time of every encoding for
 // three subscriptions, as a Markdown table, and the goals.
 //
 //   bench_encodings [--sizes] [REAL_IMAGES]
 //
-// REAL_IMAGES: a folder with sensor_a and sensor_b (ball.png, ball_reference.png), left out where
-// it is not there. Times are CPU time of the one thread: the median of kRuns after two unmeasured
+// REAL_IMAGES: a folder with sensor_a and sensor_b (ball.png, ball_reference.png); skipped where
+// it is missing. Times are CPU time of the one thread: the median of kRuns after two unmeasured
 // ones. Every map is decoded and compared before it is timed. --sizes: one run each and no times;
-// the exit code is 1 when a goal of size is short. A map that does not come back ends the program
+// the exit code is 1 when a goal of size is missed. A map that decodes differently ends the program
 // with 1.
 #include <fmt/format.h>
 
@@ -28,7 +28,7 @@
 namespace dtact::bench {
 namespace {
 
-constexpr int kFrames = 8;  // of the simulated sensor that differ in their noise alone
+constexpr int kFrames = 8;  // frames of the simulated sensor that differ only in noise
 constexpr int kRuns = 25;   // for each frame
 constexpr double kFps = 60;
 constexpr double kEncodeGoalMs = 0.5;
@@ -36,7 +36,7 @@ constexpr double kEncodeGoalMs = 0.5;
 struct Subscription {
   const char* name;
   net::DepthSpec spec;
-  double goal_mbit;  ///< At 60 fps, megabits a second.
+  double goal_mbit;  ///< Goal at 60 fps, megabits a second.
 };
 const std::vector<Subscription> kSubscriptions = {
     {"1 µm", {.decimation = 1, .um_per_unit = 1}, 50},
@@ -53,7 +53,7 @@ double median(std::vector<double> values) {
 }
 
 struct Measured {
-  double bytes = 0;  ///< A frame.
+  double bytes = 0;  ///< Bytes of a frame.
   double view_ms = 0;
   double encode_ms = 0;
   double decode_ms = 0;
@@ -100,8 +100,8 @@ Measured measure(const Recording& recording, const net::DepthSpec& spec, v1::Dep
   return measured;
 }
 
-/// Prints the recording's rows. Whether the smallest encoding meets the goals, of size alone or of
-/// time as well, is appended to `goals`; false when one of size is short.
+/// Prints the recording's rows. Appends to `goals` whether the smallest encoding meets the goals
+/// of size only or of time as well; false when one of size is missed.
 bool report(const Recording& recording, bool sizes, std::string& goals) {
   bool met = true;
   for (const Subscription& wanted : kSubscriptions) {

@@ -23,7 +23,7 @@ namespace sim = hal::sim;
 
 constexpr int kReferenceFrames = 32;
 
-/// What the simulated camera sends, decoded.
+/// The simulated camera's frames, decoded.
 class Camera {
  public:
   explicit Camera(const sim::Scene& scene)

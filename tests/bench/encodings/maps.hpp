@@ -6,12 +6,12 @@
 
 #include "daemon/pipeline/depth_frame.hpp"
 
-/// Depth maps of a ball held in contact, made as the daemon makes them: the tiles that something
-/// changed in, 0 elsewhere.
+/// Depth maps of a ball held in contact, computed like in the daemon: active tiles only,
+/// 0 elsewhere.
 namespace dtact::bench {
 
 struct Recording {
-  std::string name;  ///< Of what it was taken.
+  std::string name;  ///< What it shows.
   std::vector<pipeline::DepthFrame> frames;
 };
 

@@ -1,8 +1,8 @@
-// What ./dev bench measures latency with: clients of dtactd that stamp each frame when its last
+// Measures latency for ./dev bench: clients of dtactd that stamp each frame when its last
 // byte has come out of the socket. Nothing is decoded before the stamp.
 //   loop_client --port PORT [--clients N] [--seconds S] [--skip S] [--depth int16|predict_zstd]
 //               [--cpu CPU] [--fifo PRIORITY] -o FILE
-// FILE: one line a frame and client. Prints what of pinning and FIFO the system granted.
+// FILE: one line a frame and client. Prints whether the system granted pinning and FIFO.
 #include <arpa/inet.h>
 #include <fmt/format.h>
 #include <netinet/in.h>
@@ -55,7 +55,7 @@ struct Sample {
 
 std::int64_t now_ns() { return dtact::base::system_clock().monotonic_ns(); }
 
-/// One connection. Throws std::runtime_error when the daemon says anything unexpected.
+/// One connection. Throws std::runtime_error for an unexpected message of the daemon.
 class Connection {
  public:
   explicit Connection(std::uint16_t port) : fd_(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
@@ -88,7 +88,7 @@ class Connection {
       return;
     }
   }
-  /// The next message; received_ns() is when its last byte was here.
+  /// The next message; received_ns() is the arrival of its last byte.
   const v1::ServerMessage& receive() {
     std::uint32_t length = 0;
     read(reinterpret_cast<char*>(&length), sizeof length);
@@ -119,7 +119,7 @@ class Connection {
   std::int64_t received_ns_ = 0;
 };
 
-/// Subscribes, skips the first seconds, then notes every frame.
+/// Subscribes, skips the first seconds, then records every frame.
 void measure(const Arguments& arguments, std::vector<Sample>& samples) {
   Connection connection(arguments.port);
   v1::ClientMessage hello;
@@ -132,7 +132,7 @@ void measure(const Arguments& arguments, std::vector<Sample>& samples) {
                                                                       : v1::DEPTH_PREDICT_ZSTD);
   connection.request(subscribe);
 
-  // Later memory would come from the kernel while frames do.
+  // Reserved before, because the kernel would otherwise provide memory while frames arrive.
   samples.reserve(static_cast<std::size_t>(arguments.seconds * 2000) + 1000);
   const std::int64_t from_ns = now_ns() + static_cast<std::int64_t>(arguments.skip * 1e9);
   const std::int64_t until_ns = from_ns + static_cast<std::int64_t>(arguments.seconds * 1e9);

@@ -1,4 +1,4 @@
-"""dtactd as the loop's benchmarks start it, and what the kernel says about it."""
+"""dtactd as the loop's benchmarks start it, and the kernel's figures about it."""
 import json
 import os
 import re
@@ -25,7 +25,7 @@ class Programs:
 
 
 def prepare(programs, folder):
-    """Calibration, recordings and the last good reference, in `folder`. Made anew each time, since
+    """Calibration, recordings and the last good reference, in `folder`. Made each time, since
     the simulated sensor may have changed."""
     def run(*command):
         subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
@@ -41,11 +41,11 @@ def prepare(programs, folder):
         at["press"], "--radius-mm", "4.0", "--mm-per-px", "0.0413793", "--centre", "400,300",
         "--crop", "580,580", "-o", at["calibration"])
     ball = os.path.join(HERE, "ball.toml")
-    # Four seconds, a quarter of them untouched.
+    # Four seconds, a quarter of them without contact.
     run(programs.frames, ball, "0", str(4 * FPS), at["mjpeg"])
-    # Contact only, as pixels: nothing is left to decode when they are played.
+    # Contact only, as pixels, so that the replay decodes nothing.
     run(programs.render, "--scene", ball, "--frames", "90:138", "-o", at["grey"])
-    # A daemon that has seen the reference image once keeps it for the one that plays contact only.
+    # A daemon that has taken the reference image keeps it for the next one, which plays contact only.
     with Daemon(programs, folder, {"camera.replay.folder": at["reference"]}) as daemon:
         daemon.wait_serving()
     return at
@@ -121,7 +121,7 @@ class Daemon:
         return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
     def threads(self):
-        """"name: policy priority, CPUs" of each thread, as the kernel has it."""
+        """"name: policy priority, CPUs" of each thread, from the kernel."""
         lines = []
         for tid in sorted(map(int, os.listdir(f"/proc/{self.process.pid}/task"))):
             with open(f"/proc/{self.process.pid}/task/{tid}/comm", encoding="ascii") as file:

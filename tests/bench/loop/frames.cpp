@@ -1,5 +1,5 @@
-// loop_frames SCENE FIRST END FOLDER: frames of a simulated scene as the simulated camera sends
-// them, JPEG files for the replay backend.
+// loop_frames SCENE FIRST END FOLDER: frames of a simulated scene in the simulated camera's JPEG
+// format, as files for the replay backend.
 #include <fmt/format.h>
 
 #include <cstdint>

@@ -1,5 +1,5 @@
-// loop_jitter CPU PRIORITY SECONDS: how late this machine wakes a FIFO thread that only sleeps, a
-// millisecond at a time, in microseconds: what no program on it can be better than.
+// loop_jitter CPU PRIORITY SECONDS: delay with which this machine wakes a FIFO thread that only
+// sleeps, a millisecond at a time, in microseconds: a lower bound for every program on it.
 #include <fmt/format.h>
 #include <time.h>
 

@@ -9,14 +9,14 @@ from daemon import FPS, Daemon
 FIFO_CAPTURE = 40
 FIFO_NETWORK = 20
 FIFO_CLIENT = 10
-STEP_US = 10  # of the histogram
+STEP_US = 10  # width of a bin of the histogram
 IDLE_MS = 3.0
 LOADED_MS = 6.0
 
 Case = collections.namedtuple("Case", "name clients loaded fifo")
 CASES = [Case(f"{clients} client{'s' * (clients > 1)}, {'every core busy' if loaded else 'idle'}, "
               f"{'FIFO' if fifo else 'normal'}", clients, loaded, fifo)
-         # The idle cases first: only they need a machine that does nothing else.
+         # Idle cases first: only they need an otherwise idle machine.
          for loaded in (False, True) for clients in (1, 8) for fifo in (True, False)]
 
 
@@ -37,7 +37,7 @@ def stolen_s():
 
 
 def missed(before, after):
-    """Frames that the capture loop did not take, and faults of its thread, between two statuses."""
+    """Frames that the capture loop did not process, and faults of its thread, between two statuses."""
     frames = sum(after["camera"][k] - before["camera"][k] for k in ("lost", "skipped", "damaged"))
     usage = {k: after["capture_thread"][k] - before["capture_thread"][k]
              for k in after["capture_thread"]}
@@ -78,10 +78,10 @@ def run_case(programs, folder, recordings, case, seconds):
 
 
 def figures(result):
-    """Milliseconds, and frames that clients missed."""
+    """Latencies in milliseconds, and frames that clients missed."""
     rows = result["rows"]
     latency = sorted((int(r["received_ns"]) - int(r["ready_ns"])) / 1e6 for r in rows)
-    # A recording tells when a frame arrived; its exposure began a period earlier, as the daemon
+    # A recording's time is a frame's arrival; its exposure began a period earlier, as the daemon
     # itself assumes of such cameras.
     period = 1e9 / FPS
     start = 1
@@ -211,7 +211,7 @@ def plot(out, results, tables, label):
 
 
 def measure(programs, folder, recordings, out, label, seconds):
-    """Runs every case, prints and writes what came out, returns the goals' lines."""
+    """Runs every case, prints and writes the results, returns the goals' lines."""
     results = []
     for case in CASES:
         print(f"bench: {case.name}, {seconds:.0f} s", flush=True)

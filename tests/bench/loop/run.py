@@ -36,7 +36,7 @@ def machine():
 
 
 def surroundings(programs, seconds):
-    """What the machine does before we begin: load of other programs, and how late it wakes a FIFO
+    """State of the machine before the start: load of other programs, and how late it wakes a FIFO
     thread that only sleeps on the capture thread's CPU."""
     def read():
         with open("/proc/stat", encoding="ascii") as file:

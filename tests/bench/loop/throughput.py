@@ -8,7 +8,7 @@ from daemon import FPS, Daemon
 
 MIN_FPS = 600
 MAX_RSS_MIB = 60
-# What may still grow in a process that does not leak: the allocator's arenas of rare commands.
+# Growth allowed in a process without a leak: the allocator's arenas of rare commands.
 FLAT_KIB = 512
 CLIENTS = (1, 2, 4, 8, 16, 32, 64)
 RATES = (FPS, 4 * FPS)  # the second shows what happens when not every client can have every frame
@@ -24,7 +24,7 @@ def greatest_rate(programs, folder, recordings, seconds):
     the others. Frames a second, resident KiB once a second, encodings a second, status."""
     core = max(os.sched_getaffinity(0))
     settings = {"camera.replay.folder": recordings["grey"], "camera.replay.paced": False,
-                # A thread that never waits would keep the network from the core it shares.
+                # A thread that never waits would block the network thread on a shared core.
                 "capture.fifo_priority": 0}
     with Daemon(programs, folder, settings, ["taskset", "-c", str(core)]) as daemon:
         daemon.wait_serving()
@@ -104,7 +104,7 @@ def plot(out, points, label):
 
 
 def measure(programs, folder, recordings, out, label, seconds):
-    """Prints and writes what came out, returns the goals' lines."""
+    """Prints and writes the results, returns the goals' lines."""
     print(f"bench: greatest frame rate on one core, {seconds:.0f} s", flush=True)
     fps, rss, encoded, in_contact, status = greatest_rate(programs, folder, recordings, seconds)
     growth = rss[-1] - rss[0]

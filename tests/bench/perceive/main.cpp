@@ -1,5 +1,5 @@
-// What dtact-perceive's work takes: points and normals of a whole map and of a contact's box, and
-// the motion of what touches, on each surface, as a Markdown table, and the goals.
+// Time of dtact-perceive's work: points and normals of a whole map and of a contact's box, and
+// the motion of the object in contact, on each surface, as a Markdown table, and the goals.
 //
 //   bench_perceive [RUNS]
 //
@@ -57,8 +57,8 @@ Sensor sensor(const char* name, const recon::Surface& surface) {
   return made;
 }
 
-/// Whole micrometres of the object after a slide, with 3 µm of noise: everywhere, or as the daemon
-/// has it, which says 0 where nothing changes.
+/// Whole micrometres of the object after a slide, with 3 µm of noise: everywhere, or, like in the
+/// daemon, 0 where nothing changes.
 enum class Noise : std::uint8_t { everywhere, in_contact };
 std::vector<std::int16_t> map_of(const Sensor& sensor, double slide_mm,
                                  Noise where = Noise::everywhere) {
@@ -98,7 +98,7 @@ struct Times {
   }
 };
 
-/// Every point where the surface's normal takes it, to a tenth of a micrometre.
+/// Compares every point with the surface point plus its normal, to a tenth of a micrometre.
 void verify(const Sensor& sensor, const Part& part, const PointCloud& cloud) {
   for (int row = 0; row < cloud.height; ++row) {
     for (int column = 0; column < cloud.width; ++column) {
@@ -128,7 +128,7 @@ struct Measured {
   Times pose;
 };
 
-/// What a sensor's frames are made of.
+/// Frames of one sensor.
 struct Frames {
   Part noisy;
   std::vector<Part> whole;

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""viewers.py --build FOLDER [--viewers 16] [--seconds 20]: what dtact-web takes of a processor for so many viewers
+"""viewers.py --build FOLDER [--viewers 16] [--seconds 20]: processor time of dtact-web for this many viewers
 of one simulated sensor at 60 frames a second, by depth encoding.
 
 Counted are the processor seconds that the kernel charges to the gateway (user and system), and the messages that
@@ -22,7 +22,7 @@ CAMERA_HZ = 60
 
 
 class Drain:
-    """Takes a WebSocket's bytes and counts whole messages of the server, which masks none."""
+    """Parses a WebSocket's bytes and counts whole messages of the server, which masks none."""
 
     def __init__(self, viewer):
         self.socket = viewer.socket.stream
@@ -56,7 +56,7 @@ class Drain:
             raise SystemExit("the gateway let a viewer go")
         self.bytes += count
         if self.skip >= count:
-            self.skip -= count  # the middle of a message is not looked at
+            self.skip -= count  # the middle of a message is not parsed
             if self.skip == 0:
                 self.walk()
         else:

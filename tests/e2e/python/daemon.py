@@ -13,7 +13,7 @@ SCENES = SOURCE / "config/scenes"
 
 
 def calibrate(folder):
-    """As a user does it, from images of the scene: untouched, then a ball pressed and still."""
+    """Calibrates as a user does, from images of the scene: no contact, then a ball pressed and still."""
     scene = ["--scene", SCENES / "calibrate_ball.toml"]
     for name, frames in (("reference", "0:32"), ("ball", "200:232")):
         subprocess.run([os.environ["SIM_RENDER"], *scene, "--frames", frames, "-o", folder / name],
@@ -26,7 +26,7 @@ def calibrate(folder):
 
 
 class Daemon:
-    """Runs between start() and stop(), and again, on the same folder and port."""
+    """Runs between start() and stop(), repeatedly, on the same folder and port."""
 
     def __init__(self):
         self.folder = pathlib.Path(tempfile.mkdtemp(prefix="dtact_python_"))
@@ -59,6 +59,6 @@ class Daemon:
         shutil.rmtree(self.folder)
 
     def dtactctl(self, *arguments):
-        """What it prints."""
+        """Output of dtactctl."""
         return subprocess.run([os.environ["DTACTCTL"], "--port", str(self.port), *arguments],
                               check=True, capture_output=True, text=True).stdout

@@ -47,7 +47,7 @@ def pressed(client):
 
 class Depth(unittest.TestCase):
     def test_is_what_dtactctl_saves(self):
-        """The C++ library's decoder, on the very same frame, for every encoding."""
+        """The C++ library's decoder, on the same frame, for every encoding."""
         file = daemon.folder / "depth.npy"
         with dtact.connect(daemon.address, kept_frames=100) as s:
             for number, encoding in enumerate(["int16", "predict_zstd"], 1):
@@ -84,7 +84,7 @@ class Depth(unittest.TestCase):
             self.assertTrue(s.same_machine)
             self.assertLess(abs(time.monotonic() - f.monotonic_s), 2)
             self.assertLess(abs(time.time() - f.time.timestamp()), 2)
-            # The ball's deepest point, as the daemon found it and as the map has it.
+            # The ball's deepest point, from the daemon's summary and from the map.
             self.assertAlmostEqual(float(np.nanmax(f.depth_mm)), f.contact.deepest_mm, delta=0.1)
             self.assertGreater(f.contact.area_mm2, 0.5)
             self.assertTrue(0 < f.uncertainty_mm < 0.2, f.uncertainty_mm)
@@ -176,7 +176,7 @@ class Commands(unittest.TestCase):
         file = daemon.folder / "press.mcap"
         with path_to_dtactctl(), dtact.connect(daemon.address, kept_frames=100) as s:
             with s.record(file):
-                # On a busy machine both miss frames.
+                # On a busy machine both clients miss frames.
                 seen = list(itertools.islice((f for f in s.frames() if f.has_depth), 200))
         recorded = {f.sequence: f for f in dtact.read(file) if isinstance(f, dtact.Frame)}
         common = [f for f in seen if f.sequence in recorded]
@@ -233,7 +233,7 @@ class Connections(unittest.TestCase):
 
 
 class Documents(unittest.TestCase):
-    """What they show runs as it stands."""
+    """The README's examples run unchanged."""
 
     def run_code(self, blocks):
         names, out = {}, io.StringIO()

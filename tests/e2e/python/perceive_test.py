@@ -43,7 +43,7 @@ class Perceive(unittest.TestCase):
         self.assertEqual(f.surface, dtact.Surface("plane"))
         cloud = f.cloud
         points = cloud.points[cloud.valid]
-        # Pressed in is below the undeformed surface, metres; the deepest is where the summary says.
+        # Pressed in is below the undeformed surface, metres; the deepest is at the summary's position.
         deepest = points[np.argmin(points[:, 2])]
         self.assertAlmostEqual(-1e3 * deepest[2], f.contact.deepest_mm, delta=0.01)
         lengths = np.linalg.norm(cloud.normals[cloud.valid], axis=1)

@@ -1,11 +1,11 @@
-// node foxglove.mjs URL SUBPROTOCOL COUNT: what Foxglove's own client is told, a line of JSON each: the server's
+// node foxglove.mjs URL SUBPROTOCOL COUNT: prints what Foxglove's own client gets, a line of JSON each: the server's
 // information, its channels and services, COUNT messages of each channel that has any within its time, and the
 // answers to two calls.
 import { createRequire } from "node:module";
 import path from "node:path";
 import process from "node:process";
 
-// The packages lie where the test was started, the module itself in the tree.
+// The packages are where the test was started, the module itself is in the tree.
 const require = createRequire(path.join(process.cwd(), "node_modules", "x.js"));
 const { FoxgloveClient } = require("@foxglove/ws-protocol");
 const WebSocket = require("ws");
@@ -24,7 +24,7 @@ function end(why) {
   process.exit(0);
 }
 function finished() {
-  // A camera without JPEGs has none, and nothing may happen to the light.
+  // A camera without JPEGs sends none, and the light may not change.
   const open = [...left].filter(([topic, n]) => n > 0 && !/jpeg|light|event/.test(topic));
   if (open.length === 0 && services === 0 && topics.size > 0) end("all came");
 }

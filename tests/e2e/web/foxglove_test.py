@@ -67,7 +67,7 @@ def setUpModule() -> None:
     perceive = Perceive(folder, daemon)
     gateway = Gateway(folder, "--daemon", f"left=127.0.0.1:{daemon.port}", "--daemon", "gone=127.0.0.1:1",
                       "--daemon", f"touch=127.0.0.1:{perceive.port}")
-    # Which channels there are is known once it has greeted.
+    # The channels are known once both are connected to their daemons.
     while not all(one["connected"] for one in json.loads(request(gateway.port, "/sensors")[2])
                   if one["name"] != "gone"):
         time.sleep(0.05)
@@ -80,9 +80,9 @@ def tearDownModule() -> None:
 
 
 def reported(path: str, subprotocol: str, count: int) -> dict[str, list[Any]]:
-    """What the client is told, by kind."""
+    """Messages to the client, by kind."""
     url = f"ws://127.0.0.1:{gateway.port}{path}"
-    # A file: what node writes to a pipe it may not have written by its end.
+    # A file, because node may not have written all to a pipe when it ends.
     with open(pathlib.Path(FOLDER.name, "told"), "w+", encoding="utf-8") as out:
         subprocess.run(["node", HERE / "foxglove.mjs", url, subprotocol, str(count)], cwd=NODE, stdout=out,
                        timeout=120, check=True)
@@ -95,8 +95,8 @@ def reported(path: str, subprotocol: str, count: int) -> dict[str, list[Any]]:
 
 
 class DirectFrames(threading.Thread):
-    """What the daemon's own clients are sent meanwhile: a digest of the depth of each frame by its time,
-    micrometres, 0 where less or not to be believed."""
+    """Frames of the daemon's own clients meanwhile: a digest of the depth of each frame by its time,
+    micrometres, 0 where less or untrusted."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -124,7 +124,7 @@ class DirectFrames(threading.Thread):
 
 
 def classes(channels: list[Any]) -> dict[str, Any]:
-    """Message classes by topic, of the schemas that were told and nothing else."""
+    """Message classes by topic, from the announced schemas only."""
     made = {}
     for channel in channels:
         files = descriptor_pb2.FileDescriptorSet.FromString(base64.b64decode(channel["schema"], validate=True))
@@ -161,20 +161,20 @@ class FoxglovesClient(unittest.TestCase):
             self.assertEqual((message.width, message.height, message.encoding, message.step),
                              (800, 600, "mono8", 800))
             self.assertEqual(len(message.data), 800 * 600)
-        self.assertGreater(len(came["/dtact/light"]), 0, "it is told at first")
+        self.assertGreater(len(came["/dtact/light"]), 0, "it is sent at first")
         self.services(node)
 
     def frames(self, frames: list[tuple[int, Any]]) -> None:
         self.assertEqual(len(frames), 15)
         for time_ns, message in frames:
             self.assertEqual(time_ns, message.wall_ns)
-            # There is none while the light settles that was set.
+            # No depth comes while the new light settles.
             if message.HasField("depth"):
                 self.assertEqual(message.depth.encoding, E.DEPTH_PREDICT_ZSTD)
             self.assertFalse(message.HasField("luma"))
 
     def pictures(self, pictures: list[tuple[int, Any]], direct: DirectFrames) -> None:
-        """A picture is the depth that the daemon sends to all."""
+        """A picture equals the depth that the daemon sends to all clients."""
         compared = 0
         for time_ns, picture in pictures:
             self.assertEqual(picture.timestamp.seconds * 10**9 + picture.timestamp.nanos, time_ns)
@@ -198,7 +198,7 @@ class FoxglovesClient(unittest.TestCase):
         self.assertIn("brightnes", failures[0] + failures[1])
 
     def test_points_are_as_deep_as_the_contact(self) -> None:
-        # Of each topic the newest is told: on a busy machine two seldom are of one frame.
+        # The newest of each topic is sent: on a busy machine two seldom belong to one frame.
         for _ in range(10):
             if self.points_and_contacts_of_one_frame() > 0:
                 return
@@ -236,7 +236,7 @@ class FoxglovesClient(unittest.TestCase):
 
 
 class Protocol(unittest.TestCase):
-    """What Foxglove's client never does."""
+    """Messages that Foxglove's client never sends."""
 
     def open(self) -> WebSocket:
         socket = WebSocket(gateway.port, "/sensors/left/foxglove", Sec_WebSocket_Protocol=f"x, {V1}")
@@ -275,7 +275,7 @@ class Protocol(unittest.TestCase):
         reported: dict[str, set[str]] = {"advertise": set(), "unadvertise": set()}
         topics: dict[int, str] = {}
         with WebSocket(gate.port, "/foxglove", Sec_WebSocket_Protocol=V1) as client:
-            # Before anybody knows what is behind the address; this client subscribes to nothing.
+            # The channels come before the daemon is known; this client subscribes to nothing.
             while not reported["advertise"]:
                 self.collect(json.loads(client.receive()[1]), reported, topics)
             self.assertEqual(reported["advertise"], set(TOPICS))
@@ -303,7 +303,7 @@ class Protocol(unittest.TestCase):
         for target, word in (("/foxglove", "add ?token=\u2026"), ("/foxglove?token=x", "does not know the token")):
             with WebSocket(gate.port, target, Sec_WebSocket_Protocol=V1) as socket:
                 self.assertIn(word, json.loads(socket.receive()[1])["message"])
-                # Also of one that does not take its leave.
+                # The same for a client that disconnects without a close.
                 with self.assertRaises(Closed):
                     while True:
                         socket.receive()
@@ -337,7 +337,7 @@ class Protocol(unittest.TestCase):
                     self.assertEqual(payload[:5], b"\x01\x05\0\0\0")
                     times.append(struct.unpack("<Q", payload[5:13])[0])
             self.assertEqual(times, sorted(times))
-            self.assertLess(len(times), 60, "those that nobody took are gone")
+            self.assertLess(len(times), 60, "frames that were not read are dropped")
 
 
 if __name__ == "__main__":

@@ -33,7 +33,7 @@ def setUpModule() -> None:
     right = Daemon(HERE, "right")
     gateway = Gateway(HERE, "--daemon", f"left=127.0.0.1:{left.port}", "--daemon",
                       f"right=127.0.0.1:{right.port}", "--page", str(HERE / "page"))
-    # Both are there before anything is asked.
+    # Both daemons run before the first request.
     for name in ("left", "right"):
         with Viewer(gateway.port, name) as viewer:
             viewer.notice(lambda reported: reported["connected"])
@@ -62,7 +62,7 @@ class Frames(unittest.TestCase):
             other = theirs[same.sequence]
             self.assertEqual((same.depth.width, same.depth.height), (570, 582))
             for frame in (same, other):
-                # Each connection's own, and how long making it took.
+                # Fields of each connection, and the time that encoding took.
                 frame.ClearField("dropped")
                 frame.ClearField("times")
             self.assertEqual(same.SerializeToString(deterministic=True),
@@ -303,13 +303,13 @@ class Http(unittest.TestCase):
     def test_connections_are_bounded(self) -> None:
         held = [connect(gateway.port) for _ in range(64)]
         try:
-            # They are taken in the order that they came in.
+            # Requests are answered in their order.
             with connect(gateway.port) as late:
                 self.assertEqual(late.recv(1), b"")
         finally:
             for stream in held:
                 stream.close()
-        # That those are gone is found one by one.
+        # The gateway finds closed connections one by one.
         until = time.monotonic() + TIMEOUT
         while True:
             try:

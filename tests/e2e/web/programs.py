@@ -27,8 +27,8 @@ keys = [
 
 
 def calibrate(folder: pathlib.Path) -> pathlib.Path:
-    """The map's sides are no multiples of four and not equal: what is left over and what is mistaken
-    for the other side shows."""
+    """The map's sides are no multiples of four and not equal, so that remainders and swapped axes
+    show."""
     scene = ["--scene", SCENES / "calibrate_ball.toml"]
     for name, frames in (("reference", "0:32"), ("ball", "200:232")):
         subprocess.run([os.environ["SIM_RENDER"], *scene, "--frames", frames, "-o", folder / name],
@@ -69,12 +69,12 @@ class Program:
 
 
 class Daemon(Program):
-    """A dtactd on the simulated sensor, in which a ball is pressed again and again."""
+    """A dtactd on the simulated sensor, in which a ball is pressed repeatedly."""
 
     def __init__(self, folder: pathlib.Path, name: str, *settings: str, port: int = 0) -> None:
         scene = folder / "scene.toml"
         scene.write_text(SCENE)
-        # At normal priority: whoever else works on this machine is not pushed away.
+        # At normal priority, so that other programs on this machine keep their share.
         every = [f"net.port={port}", f"net.name={name}", f"state_dir={folder}/{name}-state",
                  f"camera.sim.scene={scene}", "capture.fifo_priority=0", "net.fifo_priority=0",
                  *settings]
@@ -82,7 +82,7 @@ class Daemon(Program):
                          folder / f"{name}.log", r"listening on 127\.0\.0\.1:(\d+)")
 
     def restart(self) -> None:
-        """On the port that it had."""
+        """Starts again on the same port."""
         if "net.port=0" in self.command:
             self.command[self.command.index("net.port=0")] = f"net.port={self.port}"
         self.start()

@@ -1,4 +1,4 @@
-"""What the page is to the gateway: a client of the daemon's wire over a WebSocket."""
+"""A client of the daemon's wire over a WebSocket, like the page."""
 import collections
 import json
 import struct
@@ -16,7 +16,7 @@ def length(size: int) -> bytes:
 
 
 class Link(Protocol):
-    """What carries the wire: each message with its length."""
+    """Transport of the wire: each message with its length."""
 
     def send(self, payload: bytes) -> None: ...
     def receive(self, seconds: float) -> tuple[int, bytes]: ...
@@ -43,7 +43,7 @@ class TcpLink:
 
 
 class Conversation:
-    """Sorts what comes: `frames`, `events`, `replies` by id, `reported` by the gateway itself."""
+    """Sorts the messages: `frames`, `events`, `replies` by id, `reported` by the gateway itself."""
 
     def __init__(self, link: Link, token: str = "", greet: bool = True) -> None:
         self.link = link
@@ -69,7 +69,7 @@ class Conversation:
         return number
 
     def sort(self, seconds: float = TIMEOUT) -> None:
-        """Takes one message."""
+        """Reads one message."""
         opcode, payload = self.link.receive(seconds)
         if opcode == TEXT:
             self.reported.append(json.loads(payload))
@@ -86,7 +86,7 @@ class Conversation:
             self.replies[message.reply.id] = message.reply
 
     def until(self, done: Callable[[], Any], what: str) -> Any:
-        """Takes messages until `done` returns something."""
+        """Reads messages until `done` returns a value."""
         end = time.monotonic() + TIMEOUT
         while not (found := done()):
             assert time.monotonic() < end, f"{what} within {TIMEOUT} s"
@@ -97,13 +97,13 @@ class Conversation:
         return self.until(lambda: self.replies.pop(number, None), f"an answer to {number}")
 
     def call(self, **what: Any) -> Any:
-        """The reply, which is no error."""
+        """The reply, which must not be an error."""
         reply = self.answer(self.ask(**what))
         assert reply.WhichOneof("result") != "error", reply
         return reply
 
     def refused(self, **what: Any) -> Any:
-        """The error that a request is answered with."""
+        """The error in the reply to a request."""
         reply = self.answer(self.ask(**what))
         assert reply.WhichOneof("result") == "error", reply
         return reply.error
@@ -118,7 +118,7 @@ class Conversation:
         return self.until(next_one, "a frame")
 
     def notice(self, where: Callable[[Any], bool]) -> Any:
-        """What the gateway says of its daemon."""
+        """The gateway's report about its daemon."""
         def next_one() -> Any:
             while self.reported:
                 reported = self.reported.popleft()
@@ -129,7 +129,7 @@ class Conversation:
 
 
 class Viewer(Conversation):
-    """Of dtact-web."""
+    """A client of dtact-web."""
 
     def __init__(self, port: int, sensor: str = "left", token: str = "", greet: bool = True,
                  **options: Any) -> None:
@@ -138,7 +138,7 @@ class Viewer(Conversation):
 
 
 class Client(Conversation):
-    """Of dtactd."""
+    """A client of dtactd."""
 
     def __init__(self, port: int) -> None:
         super().__init__(TcpLink(port))

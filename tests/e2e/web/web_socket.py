@@ -8,7 +8,7 @@ import struct
 import time
 from typing import Optional
 
-TIMEOUT = 30.0  # seconds, for what comes by itself
+TIMEOUT = 30.0  # seconds, for messages that come without a request
 TEXT, BINARY, CLOSE, PING, PONG = 1, 2, 8, 9, 10
 GUID = "258EAFA5-E914-47DA-95CA-C5AB0DC85B11"
 
@@ -98,7 +98,7 @@ class WebSocket:
 
     def send(self, payload: bytes, opcode: int = BINARY, masked: bool = True,
              announced: Optional[int] = None) -> None:
-        """One message in one frame. `announced`: another length than it has."""
+        """Sends one message in one frame. `announced`: a length other than its own."""
         size = len(payload) if announced is None else announced
         head = bytes([0x80 | opcode])
         flag = 0x80 if masked else 0

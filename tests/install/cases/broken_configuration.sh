@@ -1,7 +1,7 @@
 # shellcheck shell=bash disable=SC2154
 # A configuration with an error: a reload is refused with the reason and disturbs nothing; a restart fails
-# with the reason, and the daemon is there once the file is fixed, without another command. Likewise a
-# reload where the error is in the tokens, which lie in a file of their own.
+# with the reason, and the daemon starts once the file is fixed, without another command. The same for a
+# reload where the error is in the tokens, which are in a file of their own.
 before=$(pid)
 cp "$config" /tmp/good.toml
 sed -i 's/^fps = .*/fps = "many"/' "$config"

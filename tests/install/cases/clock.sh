@@ -1,5 +1,5 @@
 # shellcheck shell=bash disable=SC2154
-# The wall clock jumps a day ahead, two back, and home, while a client watches.
+# The wall clock jumps a day ahead, two back, and then to the true time, while a client watches.
 before=$(pid)
 dtactctl watch --summary --seconds 15 > /tmp/watch 2>&1 &
 watch=$!

@@ -20,15 +20,15 @@ within 120 dtactctl "${tls[@]}" --token-file /tmp/token status
 expect token dtactctl "${tls[@]}" status
 frames 30 5 "${tls[@]}" --token-file /tmp/token
 expect 'control' dtactctl "${tls[@]}" --token-file /tmp/token led --brightness 10
-# The check before a reload may not see them.
+# The check before a reload may not be able to read them.
 before=$(pid)
 sed -i 's/^max_clients = 32 /max_clients = 31 /' "$config"
 systemctl reload dtactd || fail "a reload with credentials is refused: $(journalctl --no-pager -b -u dtactd | tail -n 5)"
 within 60 journal_says 'changed: net.max_clients'
 is_still "$before"
 runuser -u dtactd -- test -r $store/dtactd.tokens && fail "the daemon's user reads the tokens on disk"
-# A token that is revoked there may count until a restart (systemd 252 hands in new ones with a reload,
-# later ones do not), and the reload says so.
+# A token that is revoked there may count until a restart (systemd 252 passes new ones with a reload,
+# later ones do not), and the reload reports that.
 dtactctl token --new view > /tmp/token-line
 install -m 600 /tmp/token-line $store/dtactd.tokens
 systemctl reload dtactd

@@ -1,7 +1,7 @@
 # shellcheck shell=bash disable=SC2154
-# The hardened unit's process opens a camera, an SPI device and a GPIO line of real kernel drivers by the
-# groups that udev's rules give them to; the line's bias reaches the chip, and a line that another holds is
-# named with its holder, through the libgpiod of this Debian.
+# The hardened unit's process opens a camera, an SPI device and a GPIO line of real kernel drivers through the
+# groups that udev's rules assign; the line's bias reaches the chip, and the error for a line that is in use
+# names the line's holder, with the libgpiod of this Debian.
 for module in font cfbcopyarea cfbfillrect cfbimgblt v4l2-tpg videobuf2-dma-contig; do
   insmod "/job/modules/$module.ko"
 done

@@ -1,5 +1,5 @@
 # shellcheck shell=bash disable=SC2154
-# The camera's driver does not come back from a call: the watchdog ends the daemon, and it starts anew.
+# The camera's driver does not return from a call: the watchdog ends the daemon, and systemd restarts it.
 {
   cat /usr/share/dtactd/scenes/nothing.toml
   printf '\n[[fault]]\nkind = "hang"\nframe = 600\nframes = 36000\n'

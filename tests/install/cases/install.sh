@@ -1,6 +1,6 @@
 # shellcheck shell=bash disable=SC2154
-# The packages as they are, by apt: the service runs and is enabled, and a client gets frames.
-# A secret that an administrator has put where the units look for it; it is not theirs.
+# The unmodified packages, installed by apt: the service runs and is enabled, and a client gets frames.
+# The secret belongs to an administrator, although it is where the units look for it.
 install -D -m 600 /dev/null /etc/credstore/dtactd@left.tokens
 files > /tmp/before
 apt_get install /job/packages/*.deb
@@ -12,10 +12,10 @@ frames 60 10
 systemctl status --no-pager dtactd | sed -n 's/^ *Status: /status: /p'
 systemd-analyze security --no-pager dtactd | tail -n 1
 [ "$(property NRestarts)" = 0 ] || fail "restarted: $(journalctl -b -u dtactd)"
-# Drivers that this kernel has not keep nothing from running.
+# Drivers that this kernel lacks do not keep the daemon from running.
 [ "$(systemctl show -p Result --value modprobe@{videodev,spidev,ws2812_pio_rp1}.service | sort -u | xargs)" = success ] \
   || fail "a driver's absence counts: $(systemctl list-units --all 'modprobe@*')"
-# Nothing of it runs as root.
+# No process of it runs as root.
 [ "$(ps -o user= -p "$(pid)")" = dtactd ] || fail "runs as $(ps -o user= -p "$(pid)")"
 # For the other cases a scene without gel mechanics, which starts in a tenth of the time.
 still_scene

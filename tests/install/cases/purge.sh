@@ -1,6 +1,6 @@
 # shellcheck shell=bash disable=SC2154
-# Purged, nothing is left of the packages: no file, no process, no unit; nor of a second sensor and of the page,
-# which run when they are removed. Installed again before that, what was enabled comes back.
+# After a purge nothing of the packages is left: no file, no process, no unit; nor of a second sensor and of the page,
+# which run when they are removed. When they are installed again before that, enabled units return.
 instance left 7401
 systemctl enable -q --now dtact-web
 within 120 bash -c 'ss -ltn | grep -q 127.0.0.1:7380'
@@ -15,7 +15,7 @@ within 300 dtactctl --port 7401 status
 [ "$(property ActiveState dtactd@right)" = inactive ] || fail "an instance that was not enabled was started"
 apt_get remove dtactd dtact-tools
 running && fail "it runs from programs that are gone"
-# What is a disc of its own is emptied, and the purge does not fail for its mount point.
+# A folder that is a disc of its own is emptied, and the purge does not fail for its mount point.
 discs=(/var/lib/dtactd /var/lib/private/dtact-web)
 for disc in "${discs[@]}"; do mount --bind "$disc" "$disc"; done
 apt_get purge dtactd dtact-tools libdtact1 libdtact-dev python3-dtact
@@ -25,7 +25,7 @@ for disc in "${discs[@]}"; do
   rmdir "$disc"
 done
 files > /tmp/after
-# With them /etc/credstore, whose secrets are the administrator's.
+# /etc/credstore stays, because its secrets are the administrator's.
 diff /tmp/before /tmp/after || fail "files are left or gone, see above"
 running && fail "it runs"
 [ ! -e /run/dtactd ] || fail "left: $(find /run/dtactd)"

@@ -1,5 +1,5 @@
 # shellcheck shell=bash disable=SC2154
-# Restarted by the administrator; killed; stopped by a signal, as a hang would: it comes back.
+# The administrator restarts it; it is killed; a signal stops it, like a hang: each time it runs again.
 before=$(pid)
 systemctl restart dtactd
 within 120 serving

@@ -1,6 +1,6 @@
 # shellcheck shell=bash disable=SC2154
-# The disc of the state is full, or read-only: the daemon serves, says what it cannot keep, and does not
-# start over and over.
+# The disc of the state is full, or read-only: the daemon serves, reports what it cannot keep, and does not
+# restart repeatedly.
 trap 'umount -q -l /var/lib/dtactd || true' EXIT
 on_small_disc() { # OPTIONS: mounts a disc of 256 kB as the state and starts the daemon
   systemctl stop dtactd
@@ -21,7 +21,7 @@ for trouble in fill read_only; do
   frames 60 10
   is_still "$before"
   [ "$(property NRestarts)" = 0 ] || fail "$(property NRestarts) restarts"
-  # For who wonders tomorrow why it is gone.
+  # The journal explains the next day why it is gone.
   journal_says 'the daemon will start with the one before'
   systemctl stop dtactd
   umount /var/lib/dtactd

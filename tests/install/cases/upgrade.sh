@@ -1,5 +1,5 @@
 # shellcheck shell=bash disable=SC2154
-# A newer version over this one, whose configuration the administrator has edited and the newer one too; a
+# A newer version over this one; both the administrator and the newer version changed the configuration. A
 # second sensor and the page are enabled beside it.
 within 120 serving
 echo '# kept by the administrator' >> "$config"
@@ -17,10 +17,10 @@ cmp "$config" /tmp/edited.toml || fail "the edited configuration was not kept"
 within 120 serving
 within 120 dtactctl --port 7401 status
 for unit in "${units[@]}"; do
-  # Of a file that was replaced the kernel says "(deleted)".
+  # For a replaced file the kernel appends "(deleted)".
   [[ $(program "$unit") =~ ^/usr/bin/[a-z-]+$ ]] || fail "$unit: the old program still runs: $(program "$unit")"
 done
-# Nobody wanted this one.
+# This unit was not enabled.
 [ "$(property ActiveState dtact-perceive)" = inactive ] || fail "dtact-perceive was started"
 systemctl disable -q --now dtactd@left dtact-web
 rm /etc/dtactd/left.toml

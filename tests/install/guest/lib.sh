@@ -1,5 +1,5 @@
 # shellcheck shell=bash
-# What the cases have in common; the driver puts it before them.
+# Common parts of the cases; the driver puts it before each of them.
 set -euo pipefail
 export LANG=C.UTF-8 DEBIAN_FRONTEND=noninteractive HOME=/root
 config=/etc/dtactd/dtactd.toml
@@ -9,14 +9,14 @@ fail() {
   say "FAILED: $*"
   exit 1
 }
-# expect TEXT COMMAND...: the command's output, whatever its status, has the text.
+# expect TEXT COMMAND...: the command's output contains the text, whatever its status.
 expect() {
   local text=$1 output
   shift
   output=$("$@" 2>&1) || true
   grep -qF -- "$text" <<< "$output" || fail "no \"$text\" in what '$*' printed:"$'\n'"$output"
 }
-# within SECONDS COMMAND...: the command succeeds at last. Generous, for the machine below may be busy.
+# within SECONDS COMMAND...: repeats the command until it succeeds. Generous, for the host may be busy.
 within() {
   local end=$((SECONDS + $1))
   shift
@@ -31,7 +31,7 @@ instance() {
   systemctl enable -q --now "dtactd@$1"
   within 300 dtactctl --port "$2" status
 }
-# export_calibration: the one in use, into /tmp/export. same NAME: that is /job/calibrations/NAME, byte for
+# export_calibration: exports the one in use to /tmp/export. same NAME: it equals /job/calibrations/NAME, byte for
 # byte.
 export_calibration() {
   rm -rf /tmp/export
@@ -48,8 +48,8 @@ journal_says() { journalctl --no-pager -o cat -b -u dtactd --since "$since" | gr
 serving() { systemctl is-active dtactd && dtactctl "$@" status; }
 is_still() { [ "$(pid dtactd)" = "$1" ] || fail "the daemon was started anew: $(systemctl status --no-pager dtactd)"; }
 
-# frames LEAST SECONDS [OPTION...]: a client gets so many frames, and the rate is printed. In an emulated
-# guest a sixth of them, as its sensor is asked for.
+# frames LEAST SECONDS [OPTION...]: a client gets at least LEAST frames, and the rate is printed. In an emulated
+# guest a sixth of them, like its sensor's rate.
 frames() {
   local least=$1 seconds=$2 summary count
   shift 2
@@ -63,7 +63,7 @@ frames() {
 
 apt_get() { apt-get -y -qq --no-install-recommends "$@" > /tmp/apt 2>&1 || fail "apt-get $*: $(cat /tmp/apt)"; }
 
-# What was put into the file system: all but what changes by itself.
+# Files in the file system, without those that change by themselves.
 files() {
   find / -xdev \( -path /proc -o -path /sys -o -path /run -o -path /tmp -o -path /job -o -path /dev \
     -o -path /var/cache -o -path /var/log -o -path /var/lib/apt -o -path /var/lib/dpkg \) -prune -o -print | sort
@@ -72,7 +72,7 @@ still_scene() {
   sed -i 's|^scene = ""|scene = "/usr/share/dtactd/scenes/nothing.toml"|' "$config"
   [ -z "${emulated-}" ] || sed -i 's/^fps = 60.0 /fps = 10.0 /' "$config"
 }
-# Every case but the first and the last begins with it: whatever the case before left, the daemon runs.
+# Every case but the first and the last begins with it: the daemon runs, whatever state the case before left.
 begin_case() {
   cp /tmp/still.toml "$config"
   systemctl restart dtactd || true

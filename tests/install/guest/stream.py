@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""stream.py ADDRESS FPS FRAMES: a client gets so many frames of the daemon at ADDRESS, however long they
+"""stream.py ADDRESS FPS FRAMES: a client gets FRAMES frames of the daemon at ADDRESS, however long they
 take, and says what is wrong with them:
 
 - by their own timestamps they are 1 / FPS seconds apart, as the camera's mode promises;
@@ -13,12 +13,12 @@ import sys
 
 import dtact
 
-TIMEOUT_S = 120.0  # the machine below may be busy
+TIMEOUT_S = 120.0  # the host may be busy
 TOLERANCE = 0.01
 
 
 def lost(status) -> int:
-    """Frames that came to no client, as the daemon counts them."""
+    """Frames that reached no client, from the daemon's counters."""
     camera = status.message.camera
     return camera.lost + camera.skipped + camera.damaged + status.message.skipped
 
@@ -40,7 +40,7 @@ def main(address: str, fps: float, count: int) -> str:
     missing = frames[-1][0] - frames[0][0] + 1 - count
     if missing > known:
         return f"{missing} frames are missing, of which {known} are accounted for"
-    # Over half of the frames each, so that single stamps of a camera that was late do not count.
+    # Over half of the frames each, so that single late stamps do not count.
     half = count // 2
     period_ns = statistics.median((later[1] - earlier[1]) / (later[0] - earlier[0])
                                   for earlier, later in zip(frames, frames[half:]))

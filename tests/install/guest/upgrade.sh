@@ -1,8 +1,8 @@
 # shellcheck shell=bash
-# Upgrades until the power goes; with "repair" what an administrator does after it went.
+# Upgrades until the power is cut; with "repair" it does what an administrator does afterwards.
 if [ "${1-}" != repair ]; then
   within 300 serving
-  # A file for each step that dpkg tells of.
+  # One file for each step that dpkg reports.
   dpkg -i --status-fd 3 --force-confdef --force-confold /job/newer/*.deb 3>&1 > /tmp/dpkg \
     | { step=0; while read -r _; do touch "/job/steps/$((step += 1))"; done; }
   touch /job/done
@@ -16,7 +16,7 @@ has_old() {
   dtactctl status | grep -q uncalibrated && fail "the calibration is not used"
   return 0
 }
-# What a robot has that nobody looks after.
+# A robot without an administrator is in this state.
 has_old
 say "before the repair the daemon is there, with its calibration"
 say "versions: $(dpkg-query -W -f '${Package} ${Version} ${db:Status-Abbrev}, ' '*dtact*')"

@@ -1,6 +1,6 @@
 # shellcheck shell=bash
-# After a power cut or none: the disc is in order, the daemon is up, every calibration it has is one that was
-# sent, whole. Then sends calibrations until the power goes, but for "only_look".
+# After a power cut or without: the disc is clean, the daemon runs, every calibration that it has is one that was
+# sent, complete. Then uploads calibrations until the power is cut, unless called with "only_look".
 [ "$(property Result systemd-fsck-root.service)" = success ] || fail "the file system is broken"
 within 300 serving
 expect '*' dtactctl calibration list

@@ -14,7 +14,7 @@ using hal::CameraControl;
 using hal::ControlVerdict;
 
 struct Name {
-  const char* camera;  ///< As uvcfake says it.
+  const char* camera;  ///< Name in uvcfake.
   const char* v4l2;
   /// uvcvideo asks for it before the setting, and so not after it: a part of a byte, or the value
   /// of an automatic.
@@ -41,7 +41,7 @@ constexpr std::array<Name, 15> kNames{{
 
 using Verdicts = std::map<std::string, ControlVerdict>;
 
-/// Of a camera that is asked for the first time since its plug, and did what it was told.
+/// A camera that is asked for the first time since its plug and obeys.
 Verdicts honest() {
   Verdicts verdicts;
   for (const Name& name : kNames) {
@@ -50,10 +50,10 @@ Verdicts honest() {
   return verdicts;
 }
 
-/// What is said of the controls of a camera that lies, over the real uvcvideo.
+/// Verdicts on the controls of a camera that lies, through the real uvcvideo.
 class Controls : public GuestCamera {
  protected:
-  /// Everything is set to another value than the camera comes up with.
+  /// Every control is set to another value than the camera's default.
   static hal::CameraConfig config() {
     hal::CameraConfig c = GuestCamera::config();
     c.v4l2.exposure_us = 5000;
@@ -119,7 +119,7 @@ TEST_F(Controls, OnesThatAreRefusedAreReportedWithWhatFollows) {
   }
 }
 
-// Nothing but the picture could tell.
+// Only the picture could show otherwise.
 TEST_F(Controls, WhatTheCameraConfirmsIsBelieved) {
   const UsbCamera usb(every("-l"));
   wait_for_camera();
@@ -129,7 +129,7 @@ TEST_F(Controls, WhatTheCameraConfirmsIsBelieved) {
 TEST_F(Controls, TheDriverSOwnAnswerConfirmsNothing) {
   Verdicts from_the_copy;
   for (const Name& name : kNames) from_the_copy[name.v4l2] = ControlVerdict::accepted;
-  // Those that this camera calls AUTO_UPDATE.
+  // This camera calls these AUTO_UPDATE.
   for (const char* name : {"exposure_time_absolute", "gain", "white_balance_temperature"}) {
     from_the_copy[name] = ControlVerdict::confirmed;
   }

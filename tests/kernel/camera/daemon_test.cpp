@@ -16,7 +16,7 @@
 namespace dtact::kernel_test {
 namespace {
 
-/// A client that watches until it is told to stop. It never connects again.
+/// A client that watches until stop(). It never connects again.
 class Watcher {
  public:
   explicit Watcher(std::uint16_t port)
@@ -75,8 +75,8 @@ class Watcher {
   std::thread thread_;
 };
 
-/// What the sensor's camera sees, as JPEG: two seconds untouched, one second with a ball pressed
-/// in. Rendered by the simulator.
+/// Pictures of the sensor's camera, as JPEG: two seconds without contact, one second with a ball
+/// pressed in. Rendered by the simulator.
 const std::string& sensor_pictures() {
   static const e2e::TempFolder folder;
   static const std::string pictures = [] {
@@ -167,7 +167,7 @@ TEST_F(Daemon, FourClientsWatchThroughAnUnplug) {
     for (const auto& w : watchers) before.push_back(w->frames());
 
     begin = now_s();
-    usb.emplace(std::vector<std::string>{"-i", folder()});  // everything automatic again
+    usb.emplace(std::vector<std::string>{"-i", folder()});  // all controls automatic again
     ASSERT_TRUE(eventually(kTimeout, [&] {
       for (std::size_t i = 0; i < watchers.size(); ++i) {
         if (watchers[i]->frames() <= before[i]) return false;
@@ -242,8 +242,8 @@ TEST_F(Daemon, StreamsDepthThroughAnUnplug) {
   EXPECT_EQ(daemon_->stop(SIGTERM), 0);
 }
 
-// Frozen for so long that it is closed and opened anew, though it was never away: its controls are
-// set anew, so the reference is taken anew, and depth is right against that.
+// The stream freezes for so long that it is closed and reopened, though the camera was never away:
+// its controls are set and the reference is taken again, and depth is right against that.
 TEST_F(Daemon, MeasuresDepthAgainstANewReferenceAfterAFreeze) {
   const UsbCamera usb({"-i", sensor_pictures()});
   wait_for_camera();

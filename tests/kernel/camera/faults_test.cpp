@@ -155,7 +155,7 @@ TEST_F(Faults, LocksEveryControlAndSaysWhatIsRefused) {
   hal::v4l2::V4l2Camera camera(c);
   camera.start();
   const hal::CameraInfo info = camera.info();
-  // The automatics off, the rest at the camera's defaults.
+  // The automatic controls are off, the others at the camera's defaults.
   EXPECT_EQ(value_of(info, "auto_exposure"), 1);
   EXPECT_EQ(value_of(info, "exposure_dynamic_framerate"), 0);
   EXPECT_EQ(value_of(info, "white_balance_automatic"), 0);
@@ -168,7 +168,7 @@ TEST_F(Faults, LocksEveryControlAndSaysWhatIsRefused) {
   // Four periods of 2325.6 µs are 9302.3 µs: 93 units of 100 µs.
   EXPECT_EQ(value_of(info, "exposure_time_absolute"), 93);
   EXPECT_EQ(control(info, "exposure_time_absolute").verdict, ControlVerdict::confirmed);
-  // What this camera refuses.
+  // This camera refuses this control.
   EXPECT_EQ(control(info, "sharpness").verdict, ControlVerdict::refused);
   EXPECT_NE(control(info, "sharpness").note.find("refuses sharpness = 3"), std::string::npos)
       << control(info, "sharpness").note;

@@ -13,10 +13,10 @@
 
 namespace dtact::kernel_test {
 
-/// Much longer than anything takes: the guest has one CPU, and others use this machine.
+/// Much longer than any step takes: the guest has one CPU, and other programs use this machine.
 inline constexpr double kTimeout = 20;
 
-/// What the tests of the real uvcvideo have in common.
+/// Common parts of the tests of the real uvcvideo.
 class GuestCamera : public testing::Test {
  protected:
   /// 800×600 MJPEG at 60 frames a second of the camera with serial number 0001.
@@ -70,7 +70,7 @@ class GuestCamera : public testing::Test {
                       [&](hal::GrabStatus) { return camera.report().state == state; });
   }
 
-  /// For the record: shown in the test's output.
+  /// Prints a measurement in the test's output.
   static void measured(const std::string& what, double value, const char* unit) {
     std::printf("measured (uvcvideo in User Mode Linux, simulated USB camera): %s %.3f %s\n",
                 what.c_str(), value, unit);

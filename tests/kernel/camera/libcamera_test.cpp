@@ -12,7 +12,7 @@ namespace {
 using hal::CameraState;
 using hal::Frame;
 
-/// libcamera's own pipeline for USB cameras, over the real uvcvideo. Needs a running udevd and a
+/// libcamera's own pipeline for USB cameras, on the real uvcvideo. Needs a running udevd and a
 /// firmware node above the camera.
 class Libcamera : public GuestCamera {
  protected:
@@ -41,7 +41,7 @@ TEST_F(Libcamera, StreamsMjpegByteForByte) {
   measured("libcamera, start to first frame", grab_frame(*camera, frame), "s");
   EXPECT_EQ(camera->info().pixel_format, "MJPEG");
   EXPECT_EQ(camera->info().backend, "libcamera");
-  // What libcamera calls the exposure is uvcvideo's stamp of the first packet.
+  // libcamera's exposure time stamp is uvcvideo's of the first packet.
   EXPECT_EQ(frame.info().meaning, hal::TimestampMeaning::first_packet);
   const double begin = now_s();
   for (int i = 0; i < 120; ++i) {
@@ -64,7 +64,7 @@ TEST_F(Libcamera, StreamsYuyv) {
     ASSERT_GE(played().match_yuyv(frame.luma()), 0) << i;
   }
   EXPECT_EQ(camera->info().pixel_format, "YUYV");
-  // uvcvideo has no full range to give, and turns nothing.
+  // uvcvideo offers no full range and no rotation.
   EXPECT_EQ(value_of(*camera, "full_range"), 0);
   EXPECT_EQ(value_of(*camera, "orientation"), 1);
 }
@@ -97,7 +97,7 @@ TEST_F(Libcamera, LocksWhatTheCameraLets) {
   camera->start();
   Frame frame;
   grab_frame(*camera, frame);
-  // What the driver below was told.
+  // The request that reached the driver below.
   const auto opened = hal::v4l2::DeviceName("serial:0001").open();
   std::map<std::string, std::int64_t> values;
   for (const auto& control : hal::v4l2::list_controls(opened.fd.get())) {
@@ -119,14 +119,14 @@ TEST_F(Libcamera, ComesBackAfterAnUnplug) {
   const auto camera = hal::libcamera_backend::make_camera(libcamera_config("mjpeg"));
   camera->start();
   Frame frame;
-  // udev tells of a camera's nodes in any order, another each time.
+  // udev reports a camera's nodes in any order, a different one each time.
   for (int cycle = 0; cycle < 5; ++cycle) {
     grab_frame(*camera, frame);
     usb.reset();
     measured("libcamera, unplug to unplugged state",
              grab_until_state(*camera, CameraState::unplugged), "s");
     wait_for_no_camera();
-    // Once for so long that it is looked for seldom.
+    // Once it is away for so long that the search becomes slow.
     if (cycle == 0) {
       const double later = now_s() + 5;
       grab_until(*camera, frame, [later](hal::GrabStatus) { return now_s() > later; });

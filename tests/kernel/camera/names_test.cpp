@@ -19,7 +19,7 @@ namespace {
 using hal::CameraState;
 using hal::Frame;
 
-/// What dtactctl cameras prints.
+/// Output of dtactctl cameras.
 std::string listed() {
   FILE* pipe = ::popen(DTACT_DTACTCTL " cameras", "r");
   if (pipe == nullptr) throw std::runtime_error("cannot run " DTACT_DTACTCTL);
@@ -30,15 +30,15 @@ std::string listed() {
   return text;
 }
 
-/// Names as udev gives them. Needs a running udevd.
+/// Names that udev gives. Needs a running udevd.
 class Names : public GuestCamera {
  protected:
   static constexpr const char* kByPath =
       "/dev/v4l/by-path/platform-vhci_hcd.0-usb-0:1:1.0-video-index0";
   static constexpr const char* kById = "/dev/v4l/by-id/usb-Test_Fake_UVC_camera_0001-video-index0";
 
-  /// udev takes a camera's links away after its node, and a name that is still there from the
-  /// camera before would be taken for the next one's.
+  /// udev removes a camera's links after its node; a name that is still there from the
+  /// camera before would count as the next one's.
   void TearDown() override {
     GuestCamera::TearDown();
     EXPECT_TRUE(eventually(kTimeout, [] {

@@ -60,7 +60,7 @@ std::string encode_ycc(const Image& ycc) {
   return {reinterpret_cast<const char*>(memory), size};
 }
 
-/// libjpeg's own decoding to all three components, of which the first is kept: another way than
+/// Decodes all three components with libjpeg and keeps the first: independent of
 /// the HAL's decoding to grey.
 Image decode_luma(const std::string& jpeg) {
   jpeg_decompress_struct d{};

@@ -28,7 +28,7 @@ class PlayedFrames {
   ~PlayedFrames();
 
   [[nodiscard]] const std::filesystem::path& folder() const { return folder_; }
-  /// Which picture the frame is, exactly; −1 = none.
+  /// The number of the picture that the frame equals exactly; −1 = none.
   [[nodiscard]] int match_jpeg(const hal::LumaView& luma) const { return match(jpeg_luma_, luma); }
   [[nodiscard]] int match_yuyv(const hal::LumaView& luma) const { return match(yuyv_luma_, luma); }
 

@@ -16,7 +16,7 @@ using std::chrono::milliseconds;
 
 class Streaming : public GuestCamera {
  protected:
-  /// 240 frames: every one of them bit-equal to a picture, in the order they are played.
+  /// 240 frames, each bit-equal to a picture, in the order in which they are played.
   static void stream(const hal::CameraConfig& c,
                      int (PlayedFrames::*match)(const hal::LumaView&) const) {
     hal::v4l2::V4l2Camera camera(c);
@@ -50,8 +50,8 @@ class Streaming : public GuestCamera {
     EXPECT_EQ(report.state, CameraState::streaming);
     EXPECT_EQ(report.delivered + report.skipped + report.lost,
               frame.info().sequence - first + 1 + (first - 1));
-    // The rate is a measured figure; this only tells a stream from a standstill, as a busy machine
-    // runs the guest slowly.
+    // The rate is a measured figure; this only detects a standstill: a busy machine runs the guest
+    // slowly.
     EXPECT_GT(frames / seconds, 5);
   }
 };
@@ -166,7 +166,7 @@ TEST_F(Streaming, CutFramesAreDroppedAndCounted) {
 }
 
 TEST_F(Streaming, FramesThatTheDriverMarksAreDroppedAndCounted) {
-  // By default uvcvideo keeps marked frames to itself, and they are gaps.
+  // By default uvcvideo drops marked frames, which then are gaps.
   constexpr const char* kNoDrop = "/sys/module/uvcvideo/parameters/nodrop";
   for (const bool nodrop : {false, true}) {
     std::ofstream(kNoDrop) << (nodrop ? "1" : "0") << std::flush;

@@ -8,7 +8,7 @@
 
 namespace dtact::kernel_test {
 
-/// A fake camera's life: plugged in from construction to destruction.
+/// A fake camera that is plugged in from construction to destruction.
 class UsbCamera {
  public:
   /// Starts uvcfake with these arguments. Its node appears a little later.
@@ -25,7 +25,7 @@ class UsbCamera {
   pid_t pid_ = -1;
 };
 
-/// Asks every 5 ms whether `condition` holds. False: not within `seconds`.
+/// Checks `condition` every 5 ms. False: it did not hold within `seconds`.
 [[nodiscard]] bool eventually(double seconds, const std::function<bool()>& condition);
 
 /// CLOCK_MONOTONIC in seconds.

@@ -13,8 +13,8 @@ using hal::CameraState;
 using hal::Frame;
 using hal::GrabStatus;
 
-/// The kernel's own virtual driver, loaded as /dev/video8 with an HDMI input. No camera, but it
-/// injects faults that uvcvideo cannot be brought to.
+/// The kernel's own virtual driver, loaded as /dev/video8 with an HDMI input. It is no camera, but
+/// it injects faults that uvcvideo cannot be made to show.
 class Vivid : public GuestCamera {
  protected:
   void SetUp() override {
@@ -22,7 +22,7 @@ class Vivid : public GuestCamera {
       fd_.reset(::open("/dev/video8", O_RDWR | O_CLOEXEC));
       return static_cast<bool>(fd_);
     }));
-    // Of the driver's own timings, since the kernel's macros for them are no C++.
+    // Built from the driver's own timings, since the kernel's macros for them are not C++.
     v4l2_enum_dv_timings offered{};
     do {
       ASSERT_EQ(hal::v4l2::call(fd_.get(), VIDIOC_ENUM_DV_TIMINGS, offered), 0);
@@ -70,7 +70,7 @@ TEST_F(Vivid, YuyvOfLimitedRangeBecomesFullRangeLuma) {
   EXPECT_LE(row[0], 2);
   EXPECT_GE(row[799], 253);
   for (int x = 1; x < 800; ++x) ASSERT_GE(row[x], row[x - 1]) << x;
-  // vivid hands a frame out before the end that it states, and what lies ahead isn't believed.
+  // vivid returns a frame before its stated end, and a stamp in the future isn't believed.
   EXPECT_NE(frame.info().meaning, hal::TimestampMeaning::start_of_exposure);
   EXPECT_EQ(camera.report().damaged, 0U);
   set("Timestamp Source", 1);
@@ -101,7 +101,7 @@ TEST_F(Vivid, MarkedBuffersAreDroppedAndCounted) {
   Frame frame;
   grab_frame(camera, frame);
   set("Inject V4L2_BUF_FLAG_ERROR", 1);
-  // On a busy machine a whole frame is there behind the marked one: it is handed out, and the
+  // On a busy machine a whole frame follows the marked one: it is returned, and the
   // marked one only counted.
   grab_until(camera, frame, [&](GrabStatus) { return camera.report().damage.flagged >= 1; });
   grab_frame(camera, frame);
@@ -152,7 +152,7 @@ TEST_F(Vivid, ADisconnectIsSurvived) {
   Frame frame;
   grab_frame(camera, frame);
   set("Disconnect", 1);
-  fd_.reset();  // vivid connects again when its last user lets go
+  fd_.reset();  // vivid connects again when its last user closes it
   grab_until_state(camera, CameraState::unplugged);
   grab_frame(camera, frame);
   EXPECT_GE(camera.report().disconnects, 1U);

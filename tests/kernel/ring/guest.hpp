@@ -25,7 +25,7 @@ inline void write_text(const std::filesystem::path& path, const std::string& tex
   if (!(file << text << std::flush)) throw std::runtime_error("cannot write " + path.string());
 }
 
-/// Without root's rights while it lives.
+/// Drops root's rights while it lives.
 class AsNobody {
  public:
   AsNobody() {
@@ -36,7 +36,7 @@ class AsNobody {
   ~AsNobody() { (void)!::seteuid(0); }
 };
 
-/// Waits generously for what another thread or the kernel brings about.
+/// Waits generously for an effect of another thread or of the kernel.
 template <typename Condition>
 bool eventually(Condition condition) {
   for (int i = 0; i < 1000; ++i) {

@@ -1,5 +1,5 @@
 // The ring on a Raspberry Pi 5's LED driver. Runs in the guest, with ws2812-pio-mock loaded: a
-// double that answers as drivers/misc/ws2812-pio-rp1.c does and records what would light the LEDs.
+// double that answers like drivers/misc/ws2812-pio-rp1.c and records what would light the LEDs.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -56,7 +56,7 @@ bool last_sent(const std::string& colours) {
 void remove_driver() { write_text(kDriver + "unbind", "ws2812-pio-rp1"); }
 void probe_driver() { write_text(kDriver + "bind", "ws2812-pio-rp1"); }
 
-/// The overlay loaded anew with so many LEDs.
+/// Loads the overlay again with `leds` LEDs.
 void reload(int leds) {
   remove_driver();
   write_text("/sys/module/ws2812_pio_mock/parameters/num_leds", std::to_string(leds));
@@ -85,7 +85,7 @@ class PioRing : public testing::Test {
     reload(8);
     write_text(kMock + "sent", "0");
   }
-  // An open file that outlives the driver points to freed memory there.
+  // There an open file that outlives the driver points to freed memory.
   void TearDown() override { EXPECT_EQ(read_text(kMock + "late"), "0\n"); }
 };
 
@@ -184,8 +184,8 @@ TEST_F(PioRing, ADriverThatCameBackWithAnotherCountIsReported) {
   EXPECT_TRUE(ring->attend(rainbow()).away);
 }
 
-// The driver sends once write() has returned, so that the wire waits: for what the brightness put
-// off by HZ / 20, and for eight LEDs of 30 µs and the 300 µs after which they take a new chain.
+// The driver sends once write() has returned, so the next write waits for the chain: HZ / 20 for
+// the brightness, and for eight LEDs of 30 µs plus 300 µs until they accept a new chain.
 TEST_F(PioRing, AWriteWaitsForTheChain) {
   ws2812::test::FakeClock clock;
   ws2812::PioWire wire("/dev/leds0", clock);

@@ -1,5 +1,5 @@
-// GPIO lines on the real character device and gpio-sim, whose sysfs files say what level a line
-// has. Runs in the guest.
+// GPIO lines on the real character device and gpio-sim, whose sysfs files report a line's level.
+// Runs in the guest.
 #include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -36,7 +36,7 @@ class Chip : public testing::Environment {
     write_text(config + "/bank0/label", "dtact-test");
     std::filesystem::create_directories(config + "/bank0/line1");
     write_text(config + "/bank0/line1/name", "RING_POWER");
-    // A line that the kernel itself holds, as a device tree's hog does.
+    // The kernel itself holds a line, as for a device tree's hog.
     std::filesystem::create_directories(config + "/bank0/line7/hog");
     write_text(config + "/bank0/line7/hog/name", "lcd-reset");
     write_text(config + "/bank0/line7/hog/direction", "output-low");
@@ -59,7 +59,7 @@ class Chip : public testing::Environment {
     static std::string value;
     return value;
   }
-  /// The kernel's word on a line (GPIO_V2_LINE_FLAG_...), whichever libgpiod asked it.
+  /// The kernel's flags of a line (GPIO_V2_LINE_FLAG_...), independent of the libgpiod version.
   static std::uint64_t flags(unsigned line) {
     const base::UniqueFd fd(::open(("/dev/" + name()).c_str(), O_RDONLY | O_CLOEXEC));
     gpio_v2_line_info info{};
@@ -134,7 +134,7 @@ TEST(GpioSim, TheBiasReachesTheKernelAndTheChip) {
         gpiod::open_output({.chip = "dtact-test", .line = 0, .bias = bias}, false, "key");
     EXPECT_EQ(Chip::flags(0) & kBias, flag) << bias;
     EXPECT_FALSE(Chip::level(0)) << "driven, whatever pulls";
-    // The simulated chip has the two resistors, and no means to take them away.
+    // The simulated chip has both resistors and cannot disconnect them.
     if (bias.starts_with("pull")) {
       EXPECT_EQ(read_text(Chip::sysfs() + "/sim_gpio0/pull"), bias + "\n");
     }

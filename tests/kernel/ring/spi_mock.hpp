@@ -15,7 +15,7 @@
 #include "tests/kernel/ring/guest.hpp"
 #include "tests/unit/ws2812/chain_model.hpp"
 
-/// The module spi-mock (tests/kernel/modules): an SPI controller that records what it is sent.
+/// The module spi-mock (tests/kernel/modules): an SPI controller that records its transfers.
 namespace dtact::kernel_test::spi_mock {
 
 /// One transfer as the controller saw it; the layout is the module's.
@@ -53,7 +53,7 @@ inline std::vector<Transfer> recorded() {
   return transfers;
 }
 
-/// Those that are not only zeros, which LEDs take for nothing.
+/// Transfers that are not only zeros, which LEDs ignore.
 inline std::vector<Transfer> pictures() {
   std::vector<Transfer> found;
   for (Transfer& transfer : recorded()) {
@@ -64,7 +64,7 @@ inline std::vector<Transfer> pictures() {
   return found;
 }
 
-/// What LEDs on the wire would show after a transfer.
+/// The colours that LEDs on the wire would show after a transfer.
 inline std::vector<hal::Rgb> shown_by(const Transfer& transfer) {
   hal::ws2812::test::ChainModel chain;
   chain.spi(transfer.data, transfer.head.speed_hz);

@@ -1,5 +1,5 @@
 // The SPI ring on the real spidev driver. Runs in the guest, with spi-mock loaded: a controller
-// that records what it is sent and takes the time that a wire would.
+// that records its transfers and takes the time that a wire would.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -47,7 +47,7 @@ Ws2812Config quiet() {
   return config;
 }
 
-/// Timed, at a rate that stands a guest that is a quarter late or an eighth early.
+/// Timed, at a rate that tolerates a guest that is a quarter late or an eighth early.
 Ws2812Config fast() {
   Ws2812Config config = quiet();
   config.spi_hz = 4'000'000;
@@ -85,8 +85,8 @@ TEST_F(SpiRing, TheControllerReceivesTheColours) {
   }
 }
 
-// From the network thread's hand-over to the last bit on the wire, by the controller's own clock:
-// what is printed is to be less than a frame's 16.7 ms; what is asserted is what was sent.
+// Time from the network thread's command to the last bit on the wire, by the controller's clock.
+// It is printed and should be less than a frame's 16.7 ms; the transferred bits are asserted.
 TEST_F(SpiRing, ACommandReachesTheWire) {
   Ws2812Config config = quiet();
   config.spi_check_rate = false;
@@ -213,8 +213,8 @@ TEST_F(SpiRing, WithoutPermissionTheFixIsNamedAndTheRingComesWithIt) {
       << ring->attend(rainbow()).message;
 }
 
-// As on a Raspberry Pi 4 at idle: the core clock falls from 500 to 200 MHz under a divider made for
-// 500, and no call says so.
+// A Raspberry Pi 4 at idle does this: the core clock falls from 500 to 200 MHz under a divider made
+// for 500, and no call reports it.
 TEST_F(SpiRing, AClockThatFallsIsNoticedAndTheLightComesBackWithIt) {
   const auto ring = open_spi_ring(fast());
   ASSERT_TRUE(eventually([&] { return ring->show(rainbow()).ok; }))
@@ -227,7 +227,7 @@ TEST_F(SpiRing, AClockThatFallsIsNoticedAndTheLightComesBackWithIt) {
   std::printf("told: %s\n", result.message.c_str());
   EXPECT_THAT(result.message, HasSubstr("asked for 4.000 MHz, the controller really sends 1."));
   EXPECT_THAT(result.message, HasSubstr("core_freq_min=500"));
-  // Another look at the clock or two, in which no LED is written to.
+  // Another check or two of the clock, without a write to the LEDs.
   for (int i = 0; i < 100; ++i) {
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
     EXPECT_TRUE(ring->attend(rainbow()).away);
@@ -266,7 +266,7 @@ TEST_F(SpiRing, ATransferThatWasOffIsSentAgain) {
               HasSubstr("transfers were off and sent again, the last"));
 }
 
-/// Run with spi-mock's max_hz=2000000: the driver clocks slower than asked and says nothing.
+/// Run with spi-mock's max_hz=2000000: the driver clocks slower than requested without an error.
 class SlowSpi : public SpiRing {};
 
 TEST_F(SlowSpi, IsRefusedWithBothRatesAndTheCure) {

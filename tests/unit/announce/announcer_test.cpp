@@ -20,7 +20,7 @@
 namespace dtact::announce {
 namespace {
 
-/// A system bus with an avahi-daemon whose name collides, and that is gone right after it said so.
+/// A system bus with an avahi-daemon that reports a name collision and then closes the connection.
 class DyingBus {
  public:
   DyingBus() {
@@ -51,7 +51,7 @@ class DyingBus {
     if (member == "NameHasOwner") return sd_bus_reply_method_return(call, "b", 1);
     if (member == "EntryGroupNew") return sd_bus_reply_method_return(call, "o", "/group");
     if (member == "AddService") {
-      // Whoever writes after the answer finds nobody.
+      // After this answer nobody reads what the program writes.
       ::shutdown(sd_bus_get_fd(sd_bus_message_get_bus(call)), SHUT_RD);
       static_cast<DyingBus*>(self)->dead_ = true;
       return sd_bus_reply_method_errorf(call, "org.freedesktop.Avahi.CollisionError", "taken");
@@ -81,7 +81,7 @@ class DyingBus {
   std::thread thread_;
 };
 
-// The answer is followed by another call, to a bus that is there no more.
+// The next call goes to a bus that is closed.
 TEST(Announcer, ABusThatGoesInTheMiddleIsReportedAndThrowsNothing) {
   boost::asio::io_context io;
   std::string reported;

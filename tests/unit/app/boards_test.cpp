@@ -1,4 +1,4 @@
-// The configurations of config/boards: complete, loadable, and for what their names say.
+// The configurations of config/boards are complete, load, and configure what their names say.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -21,7 +21,7 @@ struct Board {
   const char* file;
   const char* camera;
   const char* ring;
-  const char* device;  ///< Of the ring.
+  const char* device;  ///< The ring's device file.
 };
 const std::vector<Board> kExpected{
     {"radxa-rock-5b-usb-spi.toml", "v4l2", "ws2812_spi", "/dev/spidev0.1"},
@@ -49,7 +49,7 @@ TEST(Boards, TheExposureFitsIntoAFrame) {
     const hal::CameraConfig camera = load_config(kBoards / board.file, {}).config.hal.camera;
     const double exposure_us = std::max(camera.v4l2.exposure_us, camera.libcamera.exposure_us);
     EXPECT_LT(exposure_us, 1e6 / camera.fps) << board.file;
-    // libcamera's default, 20 ms, does not.
+    // libcamera's default, 20 ms, does not fit.
     if (camera.backend == "libcamera") {
       EXPECT_GT(exposure_us, 0) << board.file;
     }

@@ -261,7 +261,7 @@ TEST_F(ConfigFile, TheShippedFileHoldsTheDefaults) {
   print_config(defaults, a);
   print_config(plain, b);
   EXPECT_EQ(a.str(), b.str());
-  // Every key stands in the shipped file; the CPU depends on the machine and is a comment there.
+  // The shipped file has every key; the CPU depends on the machine and is a comment there.
   for (const KeyOrigin& key : shipped.origins) {
     if (key.key != "capture.cpu") {
       EXPECT_THAT(key.origin, HasSubstr("dtactd.toml:")) << key.key;

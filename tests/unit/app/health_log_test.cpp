@@ -25,7 +25,7 @@ pipeline::Status with(std::initializer_list<Health> health_flags) {
   return status;
 }
 
-class Conditions : public testing::Test {
+class HealthFlags : public testing::Test {
  protected:
   /// The texts of the lines a second later.
   std::vector<std::string> after(std::chrono::seconds pause, const pipeline::Status& status) {
@@ -40,7 +40,7 @@ class Conditions : public testing::Test {
   HealthLog::Time now_{1000s};
 };
 
-TEST_F(Conditions, BeginAndEndAreALineEach) {
+TEST_F(HealthFlags, BeginAndEndAreALineEach) {
   const auto lines = log_.step(with({Health::camera_fault}), now_);
   ASSERT_EQ(lines.size(), 1U);
   EXPECT_EQ(lines[0].text, "camera_fault: The camera gives no usable frames.");
@@ -52,7 +52,7 @@ TEST_F(Conditions, BeginAndEndAreALineEach) {
   EXPECT_THAT(after(1s, with({})), IsEmpty());
 }
 
-TEST_F(Conditions, OneThatComesAndGoesIsReportedOnceAMinuteWithItsCount) {
+TEST_F(HealthFlags, OneThatComesAndGoesIsReportedOnceAMinuteWithItsCount) {
   EXPECT_THAT(after(1s, with({Health::frames_lost})), ElementsAre(StartsWith("frames_lost: ")));
   EXPECT_THAT(after(1s, with({})), ElementsAre("frames_lost is over"));
   for (int i = 0; i < 10; ++i) {
@@ -69,7 +69,7 @@ TEST_F(Conditions, OneThatComesAndGoesIsReportedOnceAMinuteWithItsCount) {
                           "at the USB cable and hub."));
 }
 
-TEST_F(Conditions, OneStillThereAfterTheMinuteIsReported) {
+TEST_F(HealthFlags, OneStillThereAfterTheMinuteIsReported) {
   EXPECT_THAT(after(1s, with({Health::image_dark})), ElementsAre(StartsWith("image_dark: ")));
   EXPECT_THAT(after(1s, with({})), ElementsAre("image_dark is over"));
   EXPECT_THAT(after(1s, with({Health::image_dark})), IsEmpty());
@@ -77,14 +77,14 @@ TEST_F(Conditions, OneStillThereAfterTheMinuteIsReported) {
   EXPECT_THAT(after(1s, with({})), ElementsAre("image_dark is over"));
 }
 
-TEST_F(Conditions, WhatTheStartHasReportedIsNotReportedAgain) {
+TEST_F(HealthFlags, WhatTheStartHasReportedIsNotReportedAgain) {
   EXPECT_THAT(after(1s, with({})), IsEmpty());
   EXPECT_THAT(after(1s, with({Health::uncalibrated})), IsEmpty());
   EXPECT_THAT(after(1s, with({})), ElementsAre("uncalibrated is over"));
   EXPECT_THAT(after(1s, with({Health::uncalibrated})), ElementsAre(StartsWith("uncalibrated: ")));
 }
 
-TEST_F(Conditions, TheUsualStepsOfAStartAreNoWarnings) {
+TEST_F(HealthFlags, TheUsualStepsOfAStartAreNoWarnings) {
   const auto lines = log_.step(with({Health::starting}), now_);
   ASSERT_EQ(lines.size(), 1U);
   EXPECT_FALSE(lines[0].warning);

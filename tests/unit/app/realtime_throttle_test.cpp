@@ -24,7 +24,7 @@ TEST(RealtimeThrottle, PutsAThreadToSleepThatNeverWaits) {
   RealtimeThrottle realtime_throttle(io);
   const long before = voluntary_switches();
   const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(60);
-  // Work that is never done, as with more clients than can be served.
+  // Work without an end, as with more clients than can be served.
   std::function<void()> work = [&] {
     if (voluntary_switches() - before >= 2 || std::chrono::steady_clock::now() > end) {
       realtime_throttle.stop();

@@ -24,7 +24,7 @@ TEST(Reload, TakesWhatCanChangeAndNamesTheRest) {
   EXPECT_EQ(reload.config.log_level, "debug");
   EXPECT_EQ(reload.config.net.max_clients, 3U);
   EXPECT_EQ(reload.config.hal.camera.backend, "sim");
-  // Still to be done at the next reload, and not when the file is as it was.
+  // The next reload reports it again, and does not once the file is as before.
   EXPECT_THAT(merge(reload.config, fresh).restart,
               ElementsAre("camera.backend", "ring.brightness"));
   EXPECT_THAT(merge(reload.config, fresh).changed, IsEmpty());
@@ -44,8 +44,8 @@ TEST(Reload, TokensAndTlsChangeFromFileToFileOnly) {
   EXPECT_EQ(merge(fresh, other).config.net.token_file, "credential:tokens");
 }
 
-// systemd fills $CREDENTIALS_DIRECTORY at a start, and but for version 252 at no reload: a token
-// that was revoked since may still count.
+// systemd fills $CREDENTIALS_DIRECTORY at a start and, except for version 252, not at a reload: a
+// token that was revoked since may still count.
 TEST(Reload, SaysThatNewCredentialsNeedARestart) {
   Config config;
   EXPECT_EQ(what_was_read(merge(config, config)), "configuration read again; changed: nothing");

@@ -32,7 +32,7 @@ TEST(Service, ReportsReadinessWithStatus) {
   EXPECT_EQ(manager.next(std::chrono::seconds(10)), "READY=1\nSTATUS=listening");
 }
 
-// The queue of such a socket holds net.unix.max_dgram_qlen messages.
+// The queue of a datagram socket holds net.unix.max_dgram_qlen messages.
 TEST(Service, DoesNotWaitForAManagerThatDoesNotRead) {
   const fakes::NotifySocket manager(fakes::own_path());
   ::setenv("NOTIFY_SOCKET", manager.path().c_str(), 1);
@@ -70,7 +70,7 @@ TEST(Service, ReportsThatItReadsItsConfigurationAgain) {
               testing::MatchesRegex("RELOADING=1\nMONOTONIC_USEC=[0-9]+"));
 }
 
-// Instances on one machine would all bear its name.
+// The machine's name would be the same for all instances on it.
 TEST(Service, ANameIsTheUnitsBeforeTheMachines) {
   ::unsetenv("DTACTD_NAME");
   const std::string machine = default_name();

@@ -30,7 +30,7 @@ class WatchdogTest : public ::testing::Test {
   }
 
  protected:
-  /// How often systemd was told.
+  /// Number of watchdog messages sent to systemd.
   [[nodiscard]] int reported() const {
     int count = 0;
     while (const auto message = manager.next(0ms)) {
@@ -54,7 +54,7 @@ TEST_F(WatchdogTest, IsFedWhileTheHeartMoves) {
 
 TEST_F(WatchdogTest, IsNotFedWhileTheHeartStandsStill) {
   ::setenv("WATCHDOG_USEC", "20000", 1);
-  std::uint64_t beats = 7;  // not at zero when the watch begins
+  std::uint64_t beats = 7;  // not zero when the watch begins
   Watchdog watchdog(io, [&] { return beats; });
   for (int i = 0; i < 5; ++i) io.run_one();
   EXPECT_EQ(reported(), 0);

@@ -35,8 +35,8 @@ TEST_F(AtomicFile, WritesAndReplaces) {
   EXPECT_EQ(files(), 1);
 }
 
-// What is not on the disk before the rename is lost by a power cut after it, and so is a rename in
-// a folder that is not.
+// A power cut after the rename loses data that is not yet on the disk. The rename itself is lost
+// until its folder is on the disk.
 TEST_F(AtomicFile, IsOnTheDiskBeforeItTakesThePlaceOfTheOldOne) {
   const fakes::FileLog log(folder_);
   write_file_atomically(folder_ / "a", "one");

@@ -1,4 +1,4 @@
-// What the default calibration takes of a gel that was fitted to a press, and what of the press.
+// The default calibration: what it takes from the gel's model and what from the press.
 #include "clients/calibrate/fit/model/auto_build.hpp"
 
 #include <gmock/gmock.h>
@@ -24,8 +24,8 @@ BallPresses press_of(const ImaginedView& view) {
   return set;
 }
 
-/// Beside the contact the light falls to the right, by so many grey levels a millimetre, and did
-/// not before the press.
+/// The light beside the contact falls to the right by `levels_per_mm` grey levels a millimetre; the
+/// reference does not have this fall.
 BallPresses press_in_fallen_light(const ImaginedView& view, double levels_per_mm) {
   BallPresses set = press_of(view);
   image::Grey8& frame = set.presses[0].frames[0];
@@ -40,7 +40,7 @@ BallPresses press_in_fallen_light(const ImaginedView& view, double levels_per_mm
   return set;
 }
 
-/// What a calibration reads of the press's middle, the mean over a quarter of a millimetre.
+/// Depth that a calibration reads in the press's middle, the mean over a quarter of a millimetre.
 double deepest_mm(const Calibration& made, const BallPresses& set) {
   const ImaginedView view;
   const std::vector<float> um =
@@ -57,7 +57,7 @@ double deepest_mm(const Calibration& made, const BallPresses& set) {
   return 0.001 * sum / count;
 }
 
-// One frame's rounding is more than noise for the fit, so this is no gel that explains all.
+// One frame's rounding is more than noise for the fit, so this gel does not explain everything.
 TEST(AutoBuild, ConstrainsTheLutToAGelThatIsTheSameInAllParts) {
   const BallPresses set = press_of({});
   PressReport report;

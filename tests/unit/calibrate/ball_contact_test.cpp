@@ -1,5 +1,5 @@
-// The axisymmetric contact against what is known of it, and against the simulator's solver, which
-// shares nothing with it but the gel's compliance: two dimensions, FFT, unknown contact region.
+// The axisymmetric contact against the literature, and against the simulator's solver, which shares
+// only the gel's compliance with it: two dimensions, FFT, unknown contact region.
 #include "clients/calibrate/fit/model/ball_contact.hpp"
 
 #include <gtest/gtest.h>

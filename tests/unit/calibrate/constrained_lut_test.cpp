@@ -1,4 +1,4 @@
-// A LUT of one press at the zero of another LUT.
+// A LUT of one press with the zero of another LUT.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -40,7 +40,7 @@ recon::DepthLut list_of(const std::function<double(double)>& mm) {
   return lut;
 }
 
-// The press's own LUT bends; the gel's is a straight line through zero.
+// The press's own LUT is curved; the gel's is a straight line through zero.
 recon::DepthLut own() {
   return list_of([](double level) { return 0.02 * level + 0.0002 * level * level; });
 }

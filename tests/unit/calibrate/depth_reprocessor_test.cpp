@@ -1,4 +1,4 @@
-// dtact-calibrate reprocess: a recorded frame's depth as it was made, by another calibration.
+// dtact-calibrate reprocess: depth of a recorded frame by another calibration.
 #include "clients/calibrate/reprocess/depth_reprocessor.hpp"
 
 #include <gtest/gtest.h>
@@ -8,7 +8,7 @@
 namespace dtact::reprocess {
 namespace {
 
-/// A frame of the toy, pressed by 0.8 mm, whose recorded map was made so.
+/// A frame of the toy, pressed by 0.8 mm, whose map was recorded with these settings.
 v1::Frame recorded(std::uint32_t decimation, std::uint32_t sharpen_steps) {
   v1::Frame frame;
   frame.set_monotonic_ns(1);
@@ -38,7 +38,7 @@ TEST(DepthReprocessor, SharpensWhatWasSharpened) {
     EXPECT_EQ(sharp.depth().decimation(), 1U);
     EXPECT_EQ(sharp.depth().width(), 144U);
     EXPECT_DOUBLE_EQ(sharp.depth().mm_per_px(), 0.2);
-    // What scattering would have taken off the spot's peak is put back, the more the more steps.
+    // Sharpening restores the peak that scattering lowers, the more the more steps.
     EXPECT_GT(sharp.contact().deepest_mm(), 1.02 * deepest_mm) << steps;
     deepest_mm = sharp.contact().deepest_mm();
   }
@@ -59,7 +59,7 @@ TEST(DepthReprocessor, CountsWhatTheCalibrationCannotSharpen) {
   EXPECT_EQ(remaker.unsharpened(), 1U);
 }
 
-// What is not of the daemon's kind is made at full resolution.
+// A map of a size that the daemon does not serve is made at full resolution.
 TEST(DepthReprocessor, TakesNoResolutionThatThereIsNot) {
   DepthReprocessor remaker(fakes::toy_calibration());
   remaker.set_reference(fakes::toy_reference_q8());

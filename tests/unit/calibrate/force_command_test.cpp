@@ -53,7 +53,7 @@ class Force : public testing::Test {
     said_ = out.str() + error.str();
     return code;
   }
-  /// Eight presses of 0.5 to 1.4 mm; the scale shows what a gel of 2 mm and 0.15 MPa answers.
+  /// Eight presses of 0.5 to 1.4 mm; the scale shows the force of a gel of 2 mm and 0.15 MPa.
   [[nodiscard]] std::string readings(double factor = 1) const {
     const calibration::Calibration cal = calibration::load(at("cal"));
     const ContactReader reader(cal, cal.model->reference_q8);
@@ -93,7 +93,7 @@ TEST_F(Force, ReadsAPictureAsTheDaemonDoes) {
   EXPECT_NEAR(volume_mm3(reader.measure(at("current_reference.png")).contact), 0, 0.1);
 }
 
-// A recording is told by the end of its name alone.
+// Only the end of a name makes it a recording.
 TEST_F(Force, ReadsAPictureBelowAFolderThatIsNamedLikeARecording) {
   const calibration::Calibration cal = calibration::load(at("cal"));
   const ContactReader reader(cal, cal.model->reference_q8);
@@ -182,7 +182,7 @@ TEST_F(ForceOfARecording, TakesWhatTheDaemonMeasured) {
   };
   EXPECT_FLOAT_EQ(deepest(":10"), 0.7F);
   EXPECT_FLOAT_EQ(deepest(":8:11"), 0.6F);  // 0.5, 0.6 and 0.7
-  EXPECT_FLOAT_EQ(deepest(":2:6"), 0.15F);  // of those that touch
+  EXPECT_FLOAT_EQ(deepest(":2:6"), 0.15F);  // of those in contact
   EXPECT_THAT([&] { (void)reader.measure(file + ":0:4"); },
               ThrowsMessage<std::runtime_error>(HasSubstr("no contact")));
   EXPECT_THAT([&] { (void)reader.measure(file); },

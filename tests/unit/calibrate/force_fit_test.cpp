@@ -24,7 +24,7 @@ constexpr double kMmPerPx = 0.0417;
 constexpr double kModulus = 0.13;
 constexpr double kZero = 0.02;
 
-/// What a ball of 4 mm off the centre presses `depth_mm` deep, as a cap.
+/// The indentation map of a ball of 4 mm off the centre, `depth_mm` deep, as a cap.
 recon::CellMap cap(double depth_mm) {
   std::vector<std::int16_t> um;
   for (int y = 0; y < kHeight; ++y) {

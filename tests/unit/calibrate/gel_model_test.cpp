@@ -37,8 +37,8 @@ TEST(RadialTransform, KeepsWhatIsSmooth) {
 }
 
 TEST(Response, IntegratesItsSlope) {
-  // The slope rises from 0.4 at zero to 0.8 at 0.4 and stays; below zero it is 1.2, from −0.12
-  // on 2.
+  // The slope rises from 0.4 at zero to 0.8 at 0.4 and stays; below zero it is 1.2, and 2 below
+  // −0.12.
   const Response response{.slopes = {2, 2, 0.4, 0.8, 0.8}, .bulge_factor = 1};
   EXPECT_EQ(response.loss(0), 0);
   EXPECT_NEAR(response.loss(0.4), 0.24, 1e-12);
@@ -52,7 +52,7 @@ TEST(Response, IntegratesItsSlope) {
 }
 
 TEST(Filter, TakesScatteringBackStepByStep) {
-  // A wave of which scattering leaves a half shows as 1/2; the filter's steps bring it to
+  // A wave that scattering halves shows as 1/2; the filter's steps bring it to
   // 1/2·(1 + 1/2) and 1/2·(1 + 1/2 + 1/4).
   const Eigen::VectorXd half = Eigen::VectorXd::Constant(1, 0.5);
   EXPECT_NEAR(sharpened(half, 0)[0], 1, 1e-12);

@@ -15,13 +15,13 @@
 namespace dtact::ctl::guided::test {
 
 /// What the fake sensor shows for some frames: a ball of 4 mm on a surface of grey 200 that darkens
-/// by 30 levels a millimetre, 0.05 mm a pixel; 0 deep: untouched.
+/// by 30 levels a millimetre, 0.05 mm a pixel; depth 0 is no contact.
 struct Scene {
   double depth_mm = 0;
-  double x_px = 160;  ///< Of the lowest point.
+  double x_px = 160;  ///< Position of the lowest point.
   double y_px = 150;
   int frames = 60;
-  double step_mm = 0;  ///< Deeper with each frame: a press in motion.
+  double step_mm = 0;  ///< Added with each frame: a press in motion.
 };
 
 inline constexpr int kWidth = 320;
@@ -115,7 +115,7 @@ class FakeSensor : public Sensor {
 
   v1::Status now;
   std::function<void(v1::Status&)> on_status;
-  std::function<v1::LumaMap(const Scene&)> paint;  ///< Instead of picture().
+  std::function<v1::LumaMap(const Scene&)> paint;  ///< Used instead of picture().
   std::optional<v1::UploadCalibration> uploaded;
   bool silent = false;
   int frames_until_gone = -1;  ///< Negative: never.
@@ -127,7 +127,7 @@ class FakeSensor : public Sensor {
   std::uint64_t sequence_ = 0;
 };
 
-/// Types lines that lie ready, then ends. "~30" types nothing the next 30 times.
+/// Types prepared lines, then ends. "~30" types nothing the next 30 times.
 class FakeConsole : public Console {
  public:
   explicit FakeConsole(std::deque<std::string> lines) : lines_(std::move(lines)) {}
@@ -157,7 +157,7 @@ class FakeConsole : public Console {
 
   std::string said;
   guided::Scene drawn;
-  bool drew = false;  ///< A picture at least once.
+  bool drew = false;  ///< Whether a picture was drawn.
   bool person = false;
   bool ctrl_c = false;
 

@@ -39,7 +39,7 @@ TEST(HalfBlocks, AveragesAndKeepsTheShape) {
   ASSERT_THAT(lines, SizeIs(5)) << "half as high as wide, two pixels a line";
   // Grey 120 is the twelfth of 24: 232 + 11.
   EXPECT_THAT(lines.front(), StartsWith("\x1b[38;5;243m\x1b[48;5;243m\u2580\u2580"))
-      << "a colour is told once";
+      << "a colour is set once";
   EXPECT_THAT(half_blocks({1, 2, {7, 7}}, 50), SizeIs(1)) << "no wider than the picture";
 }
 
@@ -108,8 +108,8 @@ TEST(NextDepth, FillsTheWidestGap) {
 }
 
 TEST(ContactWidth, OfABall) {
-  // A ball of 4 mm 1.5 mm deep cuts the surface in a circle of 3.122 mm radius; the gel's
-  // contact is 3.04 (fit/press_set.cpp).
+  // A ball of 4 mm 1.5 mm deep cuts the surface in a circle of 3.122 mm radius; the contact's is
+  // 3.04 (fit/press_set.cpp).
   EXPECT_NEAR(contact_width_mm(1.5, 4), 6.06, 0.02);
   EXPECT_NEAR(depth_of_width_mm(6.06, 4), 1.5, 0.01);
 }
@@ -125,7 +125,7 @@ TEST(Covered, IsTheDepthWhereTheLutsCoverageEnds) {
   EXPECT_DOUBLE_EQ(covered_mm(made), 1.25);
 }
 
-// As the daemon compares them.
+// The daemon compares light in the same way.
 TEST(Fitness, RecordsWhatTheLedsEmit) {
   v1::LightState light;
   light.set_brightness(128);
@@ -235,7 +235,7 @@ TEST_F(Piped, ReportsAnotherProgramInJson) {
   Scene scene;
   scene.picture = &picture;
   scene.mm_per_px = 0.05;
-  scene.words = "untouched";
+  scene.words = "no contact";
   scene.prompt = {"Press", {{"", "take the press"}, kQuit}};
   scene.presses = {{"press-01", 3, 4, 5, 1.25}};
   scene.presses_required = 6;
@@ -247,7 +247,7 @@ TEST_F(Piped, ReportsAnotherProgramInJson) {
   ASSERT_TRUE(google::protobuf::util::JsonStringToMessage(line, &reported).ok()) << line;
   EXPECT_EQ(reported.text(), "first\nsecond");
   std::getline(lines, line);
-  // dtact-web tells scenes, which may yield to newer ones, by how they begin.
+  // dtact-web recognises scenes, which may be replaced by newer ones, by how they begin.
   EXPECT_TRUE(line.starts_with(R"({"scene":)")) << line;
   ASSERT_TRUE(google::protobuf::util::JsonStringToMessage(line, &reported).ok()) << line;
   EXPECT_EQ(image::decode_png_grey16(reported.scene().picture_png(), "picture").width, 16);

@@ -52,7 +52,7 @@ class GuidedSession : public testing::Test {
   Plan plan_;
 };
 
-/// Untouched, then presses with untouched pauses in between.
+/// No contact, then presses with pauses without contact in between.
 std::vector<Scene> presses(const std::vector<Scene>& each) {
   std::vector<Scene> scenes{kContactFree};
   for (const Scene& press : each) {
@@ -79,7 +79,7 @@ TEST_F(GuidedSession, GoesFromNothingToAnUpload) {
                     HasSubstr("press-04 taken"),
                     HasSubstr("the daemon uses calibration ball from now on")));
   EXPECT_TRUE(has("preview.png"));
-  // What the daemon compares itself with.
+  // The daemon compares itself with these.
   const calibration::Calibration made = calibration::load(plan_.folder / "calibration");
   EXPECT_EQ(made.origin.camera, "fake:1");
   EXPECT_EQ(made.origin.pixel_format, "mjpeg");
@@ -87,7 +87,7 @@ TEST_F(GuidedSession, GoesFromNothingToAnUpload) {
   ASSERT_EQ(made.origin.controls.size(), 1U);
   EXPECT_EQ(made.origin.controls[0].value, 100);
   EXPECT_EQ(made.origin.leds, std::vector<std::uint8_t>(24, 255));
-  // 30 grey levels a millimetre, within what four presses of noisy frames determine.
+  // 30 grey levels a millimetre, as well as four presses of noisy frames determine it.
   const recon::DepthLut& lut = made.model->lut;
   for (const double mm : {0.3, 0.6, 0.9, 1.2}) {
     const auto q6 = static_cast<std::size_t>(std::lround(mm * 30 * 64) - lut.first_q6);
@@ -179,7 +179,7 @@ TEST_F(GuidedSession, RetakesTheLastPress) {
   EXPECT_TRUE(has("press-02"));
   EXPECT_FALSE(has("press-03"));
   EXPECT_THAT(console.said, HasSubstr("[r] retake press-02"));
-  // The third press stands where the second was: at column 180.
+  // The third press is where the second was: at column 180.
   EXPECT_THAT(console.said, HasSubstr("press-02 taken: a contact"));
   const std::size_t last = console.said.rfind("press-02 taken");
   EXPECT_THAT(console.said.substr(last, 80), HasSubstr("column 180, row 150"));
@@ -240,7 +240,7 @@ TEST_F(GuidedSession, NamesThePressThatIsMissing) {
                     HasSubstr("Press 3 of 4: the one that is missing")));
 }
 
-/// A ball of 4 mm in a gel, at the scene's place, as deep as makes a contact of so many mm.
+/// A ball of 4 mm pressed into a gel at the scene's position; `depth_mm` is the contact's radius.
 v1::LumaMap gel_picture(const Scene& scene) {
   static std::map<double, v1::LumaMap> painted;  // a picture takes a while
   v1::LumaMap& map = painted[scene.depth_mm];

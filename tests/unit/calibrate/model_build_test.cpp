@@ -1,4 +1,4 @@
-// Calibrations by the gel's model from images that the model itself makes.
+// Calibrations by the gel's model from images that the model itself computes.
 #include "clients/calibrate/fit/model/model_build.hpp"
 
 #include <gtest/gtest.h>
@@ -40,7 +40,7 @@ double deepest_mm(const Calibration& calibration, const ImaginedView& view) {
   return 0.001 * sum / count;
 }
 
-// Light that grows by 1.2 % a millimetre, of which darkening is a share.
+// The light grows by 1.2 % a millimetre, and darkening is a share of it.
 TEST(ModelBuild, ABoardThatAskedForNoGainIsBelieved) {
   ImaginedView view;
   view.light = [](int x, int) { return 160 * (1 + 0.012 * ImaginedView::kMmPerPx * (x - 200)); };
@@ -54,7 +54,7 @@ TEST(ModelBuild, AGainStaysAtItsPlaceOnTheSurface) {
   ImaginedView view;
   view.col = 130;
   const recon::FlatFieldGain on_surface{.polynomial = {0, 0, 0.004, 0.001, 0.002}};
-  // Of a lens whose board's middle the camera shows at column 250, row 180.
+  // The camera shows the middle of the lens's board at column 250, row 180.
   const auto gain_at = [&](double x, double y) {
     return on_surface.polynomial_at((x - 250) * ImaginedView::kMmPerPx,
                                     (y - 180) * ImaginedView::kMmPerPx);

@@ -1,5 +1,5 @@
-// The fit and its LUTs on presses that the model itself makes: what it must find then is known.
-// How it does on sensors that another simulator makes: tests/accuracy/model.
+// The fit and its LUTs on presses that the model itself computes, so that the truth is known.
+// tests/accuracy/model fits sensors of another simulator.
 #include "clients/calibrate/fit/model/model_fit.hpp"
 
 #include <gtest/gtest.h>
@@ -101,7 +101,7 @@ TEST(ModelLutTest, ReadsABallThroughEveryFilter) {
   const MapOptics optics{kLight, kSmoothing, 0.04};
   const auto luts = luts_of(gel(), optics, 1.5);
   const BallContact contact = press_ball_to(5, 1, 2.2);
-  // Each step of the filter takes away what the shape of an object does to its reading.
+  // Each step of the filter reduces the influence of an object's shape on its reading.
   const std::vector<double> allowed = {0.03, 0.02, 0.015};
   for (int steps = 0; steps < kLuts; ++steps) {
     const recon::DepthLut& lut = luts[static_cast<std::size_t>(steps)];

@@ -100,7 +100,7 @@ TEST_F(Offline, RefusesADoubtfulCalibrationUnlessForced) {
   EXPECT_THAT(run(with(arguments, "--force")),
               AllOf(HasSubstr("doubtful: a grey level is 0.3 um"), HasSubstr("method auto")));
   EXPECT_EQ(calibration::load(at("cal")).model->mm_per_px, 0.005);
-  // One press or several, ours or not.
+  // Both one press and several, with our files and with others'.
   EXPECT_THAT([&] { run(with(arguments, "--method", "published")); },
               ThrowsMessage<std::runtime_error>(HasSubstr("a grey level is")));
   write("light.png", Ball{.depth_mm = 0.5}.frame());

@@ -10,7 +10,7 @@
 
 namespace dtact::calibration {
 
-/// A camera's view of a ball pressed into a gel, as the gel's model imagines it.
+/// A camera's view of a ball pressed into a gel, predicted by the gel's model.
 struct ImaginedView {
   static constexpr double kMmPerPx = 0.06;
 
@@ -25,7 +25,7 @@ struct ImaginedView {
   double contact_radius_mm = 2.8;
   /// Grey level of the undeformed surface at a pixel.
   std::function<double(int x, int y)> light = [](int, int) { return 160.0; };
-  /// How much more often darkening counts at a pixel than where it is 1.
+  /// Factor of darkening at a pixel.
   std::function<double(int x, int y)> gain = [](int, int) { return 1.0; };
 
   [[nodiscard]] BallContact contact() const {
@@ -48,7 +48,7 @@ struct ImaginedView {
       const auto at = std::min<Eigen::Index>(static_cast<Eigen::Index>(place), loss.size() - 2);
       const double part = std::min(1.0, place - static_cast<double>(at));
       const double lost = std::lerp(loss[at], loss[at + 1], part);
-      // Rounded by turns up and down, so that means over pixels hold fractions of a level.
+      // Dithered before rounding, so that means over pixels hold fractions of a level.
       const double dither = ((x + 2 * y) % 4 - 1.5) / 4;
       const double level = light(x, y) * (1 - lost / gain(x, y));
       image.pixels.push_back(static_cast<std::uint8_t>(std::lround(level + dither)));

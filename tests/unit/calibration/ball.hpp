@@ -31,7 +31,7 @@ struct Ball {
     }
     return map;
   }
-  /// As a frame over a contact-free grey of 200.
+  /// The same as a frame over a contact-free grey of 200.
   [[nodiscard]] image::Grey8 frame() const {
     image::Grey8 image{width, height, {}};
     for (int y = 0; y < height; ++y) {
@@ -54,8 +54,8 @@ struct Ball {
   }
 };
 
-/// A part of the picture that shows the housing: 28 grey levels, and 20 while the ball is in. As a
-/// share of the light that is 57 of 200, more than the ball's 45.
+/// A part of the picture that shows the housing: 28 grey levels, and 20 while the ball is in. This
+/// is 57 of 200 as a share of the light, more than the ball's 45.
 inline void darken(image::Grey16& reference_q8, image::Grey8& frame, int from_x, int from_y,
                    int side) {
   for (int y = from_y; y < from_y + side; ++y) {

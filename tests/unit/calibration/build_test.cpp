@@ -158,7 +158,7 @@ TEST(Build, ALightThatFallsToOneSideIsSeenInOnePress) {
   EXPECT_THAT(choices.describe(), HasSubstr("as a share of the light: as it is"));
 }
 
-// In the corner what is taken for a contact leaves the map; beside the ball it does not.
+// In the corner the false contact reaches the map's edge; at 20 pixels from it, it does not.
 TEST(Build, ADarkPartOfTheMapDoesNotCostThePress) {
   for (const int from : {0, 20}) {
     BallPress press = press_of(Ball{});

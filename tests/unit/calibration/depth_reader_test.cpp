@@ -12,7 +12,7 @@
 namespace dtact::calibration {
 namespace {
 
-/// What the daemon's own way for so many steps makes of a frame.
+/// The depth map that the daemon computes from a frame with `steps` of sharpening, micrometres.
 std::vector<std::int16_t> served(const std::shared_ptr<const Calibration>& calibration,
                                  const std::vector<std::uint16_t>& reference_q8,
                                  const fakes::ToyFrame& frame, int steps) {

@@ -69,7 +69,7 @@ TEST_F(LensFileTest, IsReadBackExactly) {
   EXPECT_EQ(again.gain.polynomial, file.gain.polynomial);
 }
 
-// A board of pins that asks for no gain is an answer, a chessboard is none.
+// A board of pins whose gain is none is an answer; a chessboard gives no answer.
 TEST_F(LensFileTest, ReportsNoGainFromNoAnswer) {
   LensFile file = load();
   for (const bool reported : {false, true}) {

@@ -42,7 +42,7 @@ TEST(FitLut, SpansAndCoversWhatItSays) {
 TEST(FitLut, IsMonotoneAndStraightUnderNoise) {
   DarkeningMap map = Ball{}.map();
   std::mt19937 random(3);
-  std::normal_distribution<float> noise(0, 0.3F);  // what smoothing leaves of one grey level
+  std::normal_distribution<float> noise(0, 0.3F);  // the rest of one grey level after smoothing
   for (float& level : map.levels) level += noise(random);
   const recon::DepthLut lut = fit(map);
   EXPECT_TRUE(std::ranges::is_sorted(lut.um));

@@ -7,7 +7,7 @@
 
 namespace dtact::calibration {
 
-/// What the LUT reads at a darkening of so many grey levels, micrometres.
+/// What the LUT reads at a darkening of `level` grey levels, micrometres.
 inline double um_at(const recon::DepthLut& lut, double level) {
   return lut.um[static_cast<std::size_t>(std::lround(level * 64) - lut.first_q6)];
 }

@@ -51,7 +51,7 @@ TEST(UncertaintyOfZero, CountsHowFarTheLutIsFromTheSphere) {
   }
 }
 
-// The sphere is where the gauge has it, and the ring has no part in that.
+// The sphere is at the gauge's depth, and the ring does not contribute.
 TEST(UncertaintyOfZero, OfAMeasuredDepthIsAGreyLevel) {
   const std::vector<SettledPress> presses{settled(Ball{.depth_mm = 1.2})};
   for (const auto& row : uncertainty_of_zero(line(), presses, 1.2)) {
@@ -84,8 +84,8 @@ TEST(UncertaintyOfZero, EveryMethodStatesIt) {
   ASSERT_EQ(own.size(), 8U);
   ASSERT_EQ(published.size(), 7U);
   ASSERT_EQ(regression.size(), 5U);
-  // The zero's 105 um, and what the fit leaves; the published LUTs are zeroed 0.1 to 0.15 mm
-  // deep.
+  // The zero's 105 um, and the fit's residual; the published LUTs have their zero at 0.1 to 0.15 mm
+  // of depth.
   EXPECT_NEAR(own[4].error_um, 105, 4);
   EXPECT_NEAR(published[4].error_um, 178, 15);
   EXPECT_GT(regression[3].error_um, 125);

@@ -110,12 +110,12 @@ TEST(Doubts, OfBuiltCalibrations) {
   for (const double depth_mm : {0.4, 0.7, 1.0, 1.5, 1.9}) {
     EXPECT_THAT(doubts_of(scaled_press_of(Ball{.depth_mm = depth_mm})), IsEmpty()) << depth_mm;
   }
-  // A decimal point off.
+  // The scale's decimal point is at the wrong place.
   EXPECT_THAT(doubts_of(scaled_press_of(Ball{}, 0.005)),
               Contains(HasSubstr("a grey level is 0.3 um")));
   EXPECT_THAT(doubts_of(scaled_press_of(Ball{}, 0.05, 40)),
               Contains(HasSubstr("a grey level is 2.9 um")));
-  // 1.9 mm deep the contact is 3.4 mm wide of which a ball of 3.2 mm has not as much.
+  // 1.9 mm deep, the contact's radius is 3.4 mm, more than a ball of 3.2 mm has.
   EXPECT_THAT(doubts_of(scaled_press_of(Ball{.depth_mm = 1.9}, 0.05, 3.2)),
               Contains(HasSubstr("LUT and sphere disagree")));
   EXPECT_THAT(doubts_of(scaled_press_of(Ball{.depth_mm = 1.9}, 0.0552)),
@@ -131,7 +131,7 @@ TEST(Doubts, OfAPublishedLut) {
 }
 
 TEST(Doubts, OfAPressHalfInTheDark) {
-  // To the right of the middle nothing is lit, in neither of the images.
+  // The right half is dark in both images.
   BallPress press = scaled_press_of(Ball{});
   for (int y = 0; y < 240; ++y) {
     for (int x = 130; x < 260; ++x) {
@@ -143,7 +143,7 @@ TEST(Doubts, OfAPressHalfInTheDark) {
   EXPECT_THAT(doubts_of(press), Contains(HasSubstr("too dark to be seen")));
 }
 
-// A corner at a quarter of the light: 625 of 62400 pixels, the nearest at (24, 24), the ball at
+// A corner has a quarter of the light: 625 of 62400 pixels, the nearest at (24, 24), the ball at
 // (120.25, 110.5).
 TEST(DimPart, IsReportedWhereNobodySaidTheGain) {
   BallPresses set;
@@ -187,7 +187,7 @@ TEST(Doubts, OfSeveralPressesNameThePress) {
   set.mm_per_px = 0.05;
   const Calibration made = build(set);
   EXPECT_THAT(doubts_about(made, set), IsEmpty());
-  // One that this LUT did not see, half in the dark, is found out by its name.
+  // A press that this LUT did not see and that is half in the dark is found by its name.
   image::Grey8 half = Ball{.depth_mm = 1.2}.frame();
   for (std::size_t i = 0; i < half.pixels.size(); ++i) {
     if (i % 260 >= 120) half.pixels[i] = 200;

@@ -80,7 +80,7 @@ TEST(PressAsymmetry, AQuadraticIsFound) {
 TEST(PressAsymmetry, AnEvenPressUnderNoiseHasNone) {
   DarkeningMap map = Ball{}.map();
   std::mt19937 random(3);
-  std::normal_distribution<float> noise(0, 0.3F);  // what smoothing leaves of one grey level
+  std::normal_distribution<float> noise(0, 0.3F);  // the rest of one grey level after smoothing
   for (float& level : map.levels) level += noise(random);
   const Found found = find(map);
   EXPECT_EQ(found.chosen.gain.order, AsymmetryOrder::none);
@@ -89,7 +89,7 @@ TEST(PressAsymmetry, AnEvenPressUnderNoiseHasNone) {
   EXPECT_EQ(found.level.map.levels, map.levels);
 }
 
-// It is a bend of the LUT just as well, and elsewhere on the sensor it would be wrong.
+// It may as well be a bend of the LUT, and elsewhere on the sensor it would be wrong.
 TEST(PressAsymmetry, WhatFallsOffAlikeOnAllSidesIsLeftToTheLut) {
   const Ball ball;
   DarkeningMap map = ball.map();
@@ -106,14 +106,14 @@ TEST(PressAsymmetry, WhatFallsOffAlikeOnAllSidesIsLeftToTheLut) {
 TEST(PressAsymmetry, TheLevelledPressIsTheBallAgain) {
   const UnevenBall press{.a = -0.02, .b = 0.01};
   const Found found = find(press.map());
-  // Up to a factor, that of the gain at the contact's centre.
+  // The factor is the gain at the contact's centre.
   const double whole = found.level.map.at(120, 110) / press.ball.level(120, 110);
   for (const auto& [x, y] : {std::pair{85, 110}, {155, 110}, {120, 75}, {120, 145}}) {
     EXPECT_NEAR(found.level.map.at(x, y), whole * press.ball.level(x, y), 0.1) << x << ", " << y;
   }
 }
 
-// One pixel beyond the rim and fifty: no polynomial runs off to where the press says nothing.
+// One and fifty pixels beyond the rim: the polynomial is not extrapolated.
 TEST(PressAsymmetry, BeyondTheContactItIsHeld) {
   DarkeningMap map = Ball{}.map();
   const Contact contact = find_contact(map, 4);
@@ -143,7 +143,7 @@ TEST(PressAsymmetry, TheZeroHangsOnNeitherSectorNorStartNorReach) {
   const SymmetricPress moved = without_asymmetry(
       map, start, fit_asymmetry(sure_samples(map, start), 4, AsymmetryOrder::quadratic));
   EXPECT_NEAR(fit_sag(moved.map, moved.contact).depth_mm, depth, 0.01);
-  for (const double part : {0.8, 0.9, 1.05}) {  // of the sure part's radius
+  for (const double part : {0.8, 0.9, 1.05}) {  // factors of the sure part's radius
     Contact reach = found.level.contact;
     reach.radius_mm *= part;
     EXPECT_NEAR(fit_sag(found.level.map, reach).depth_mm, depth, 0.01);

@@ -47,8 +47,8 @@ TEST(FitChain, AMeasuredDepthTiesTheChain) {
 }
 
 TEST(FitChain, NeverFalls) {
-  // 24 to 30 grey levels measured at 0.8 to 1.0 mm, 31 to 36 at 0.5 to 0.7 mm: a gel that
-  // answered so could not be read.
+  // 24 to 30 grey levels measured at 0.8 to 1.0 mm, 31 to 36 at 0.5 to 0.7 mm: no LUT can read this
+  // response.
   SagProfile deep = rings(1.0, 1.2);
   deep.depth_mm = 1.0;
   SagProfile darker = rings(1.2, 1.2);
@@ -111,7 +111,7 @@ TEST(BuildFromPresses, ReadsALinearResponse) {
   }
 }
 
-/// The set's images with the light falling from left to right, and darkening with it.
+/// The set's images with light and darkening that fall from left to right.
 void shade(BallPresses& set, double by = 0.3) {
   const auto light = [by](std::size_t i) { return 1 - by * static_cast<double>(i % 260) / 259; };
   for (std::size_t i = 0; i < set.reference_q8.pixels.size(); ++i) {
@@ -138,7 +138,7 @@ TEST(BuildFromPresses, UnevenLightPaysForAGain) {
   EXPECT_NEAR(report.presses[3].depth_mm, 1.0, 0.03);
 }
 
-/// Eight presses at several places and depths.
+/// Eight presses at different places and depths.
 std::vector<Ball> eight_balls() {
   return {
       Ball{.col = 95, .row = 100, .depth_mm = 0.5},  Ball{.col = 165, .row = 95, .depth_mm = 0.6},
@@ -152,7 +152,7 @@ TEST(BuildFromPresses, AnEvenSensorGetsNoGain) {
   const Calibration made = build(set_of(eight_balls()), &report);
   EXPECT_EQ(made.model->gain.shape, recon::GainShape::none);
   EXPECT_TRUE(made.model->gain.polynomial.empty());
-  // Presses within 1.8 mm say nothing of a quadratic at the map's corners, 9 mm away.
+  // Presses within 1.8 mm do not determine a quadratic at the map's corners, 9 mm away.
   ASSERT_EQ(report.gains.size(), 4U);
   EXPECT_EQ(report.gains[0].name, "none");
   EXPECT_TRUE(report.gains[0].chosen);
@@ -196,7 +196,7 @@ TEST(BuildFromPresses, AGainThatIsBetterByChanceIsNotTaken) {
 
 TEST(BuildFromPresses, AThickerSidePaysForAPlane) {
   BallPresses set = set_of(eight_balls());
-  // The same light everywhere, but darkening grows by 6 % a millimetre to the right.
+  // The light is the same everywhere, but darkening grows by 6 % a millimetre to the right.
   for (auto& press : set.presses) {
     for (std::size_t i = 0; i < press.frames[0].pixels.size(); ++i) {
       const double x_mm = 0.05 * (static_cast<double>(i % 260) - 129.5);
@@ -227,7 +227,7 @@ TEST(LeaveEachOut, FreesOnlyTheDepthOfThePress) {
     return rings;
   };
   const ChainFit lut = chain_presses({press(0.6, 1), press(0.9, 1), press(1.3, 1)}).fit;
-  // A press that darkens by a tenth more than the LUT knows: its depth takes up the offset, the
+  // A press that darkens by a tenth more than the LUT: the offset goes into its depth, and the
   // sphere's shape does not fit.
   const LeftOutResidual same = residual_of(press(0.8, 1), lut);
   const LeftOutResidual other = residual_of(press(0.8, 1.1), lut);
@@ -237,7 +237,7 @@ TEST(LeaveEachOut, FreesOnlyTheDepthOfThePress) {
   // A tenth of the sag, whose mean distance from its mean is about a quarter of its range: the
   // sure contact reaches 1.2 mm, a sag of 0.18 mm.
   EXPECT_NEAR(other.mean_error_mm(), 0.1 * 0.18 / 4, 0.002);
-  // Where the depth was measured the offset counts, too.
+  // The offset counts where the depth was measured.
   PressRings measured = press(0.8, 1.1);
   measured.all.depth_mm = 0.8;
   EXPECT_NEAR(residual_of(measured, lut).mean_error_mm(), 0.08, 0.015);
@@ -294,8 +294,8 @@ TEST(BuildFromPresses, ADarkPartOfTheMapCostsNoPress) {
   EXPECT_THAT(report.note, AllOf(HasSubstr("press 1: the contact"), HasSubstr("--crop")));
 }
 
-// Presses that differ by a tenth either way make a LUT that is sure to a tenth over the root of
-// their number.
+// Presses that differ by a tenth either way determine a LUT to a tenth over the root of their
+// number.
 TEST(BuildFromPresses, StatesHowFarThePressesThatMadeTheLutDiffer) {
   std::vector<Ball> balls;
   for (const double depth_mm : {0.5, 0.8, 1.1, 1.4}) {
@@ -330,7 +330,7 @@ TEST(BuildFromPresses, SaysWhatToPressNext) {
 }
 
 TEST(BuildFromPresses, ARefusalForAGapNamesThePressThatWasLeftOut) {
-  // The first would close the gap, but its 7 grey levels are no contact.
+  // The first would close the gap, but its 7 grey levels are not a contact.
   EXPECT_THAT(
       [] {
         (void)build(set_of({Ball{.depth_mm = 0.23}, Ball{.depth_mm = 0.8}, Ball{.depth_mm = 0.8}}));

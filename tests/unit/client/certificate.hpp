@@ -14,10 +14,10 @@
 
 namespace dtact::client::test {
 
-/// A certificate that signs itself, valid for an hour, with its key: what a daemon shows.
+/// A self-signed certificate with its key, valid for an hour: the daemon's.
 class Certificate {
  public:
-  /// `names`: as in subjectAltName, "IP:127.0.0.1,DNS:gripper".
+  /// `names` has the form of subjectAltName: "IP:127.0.0.1,DNS:gripper".
   explicit Certificate(const std::string& names)
       : key_(::EVP_EC_gen("P-256")),
         certificate_(::X509_new()),
@@ -43,7 +43,7 @@ class Certificate {
     }
   }
 
-  /// SHA-256 of its DER, lower case.
+  /// SHA-256 of the DER encoding, lower case.
   [[nodiscard]] std::string fingerprint() const {
     std::array<unsigned char, EVP_MAX_MD_SIZE> digest{};
     unsigned int size = 0;

@@ -1,4 +1,4 @@
-// What daemons can do, and requests that take long.
+// Features that daemons announce, and requests that take long.
 #include <gtest/gtest.h>
 
 #include "clients/cpp/client.hpp"
@@ -7,7 +7,7 @@
 namespace dtact::client::test {
 namespace {
 
-// The daemon's refusal comes after timeout_frames, which may be longer than any other answer
+// The daemon refuses after timeout_frames, which may be longer than other requests' timeout.
 // takes.
 TEST(Rezero, WaitsAsLongAsTheDaemonSays) {
   PlayedDaemon daemon({[](Peer& peer) {

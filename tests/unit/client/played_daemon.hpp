@@ -27,7 +27,7 @@
 
 namespace dtact::client::test {
 
-/// Longer than anything takes that does come.
+/// Longer than any message takes.
 inline constexpr std::chrono::seconds kLong{60};
 
 inline std::string framed(const v1::ServerMessage& message) {
@@ -74,7 +74,7 @@ class Peer {
     message.mutable_frame()->set_sequence(sequence);
     send(message);
   }
-  /// Takes the next request, which it returns, and answers it with `reply`.
+  /// Answers the next request with `reply` and returns the request.
   v1::ClientMessage answer(v1::Reply reply) {
     v1::ClientMessage message = request();
     reply.set_id(message.id());
@@ -94,7 +94,7 @@ class Peer {
     reply.mutable_error()->set_message(sentence);
     return answer(std::move(reply));
   }
-  /// Takes Hello, which it returns.
+  /// Answers Hello and returns it.
   v1::Hello greet(const std::vector<std::string>& features = {}) {
     v1::Reply reply;
     auto& hello = *reply.mutable_hello();
@@ -151,8 +151,8 @@ inline base::UniqueFd listen_on(const std::filesystem::path& file) {
   return fd;
 }
 
-/// A daemon that does what a test wants: one play for each connection, in turn. A play that meets
-/// the end of its connection is over.
+/// A daemon that a test plays: one play for each connection, in turn. A play ends when its
+/// connection ends.
 class PlayedDaemon {
  public:
   using Play = std::function<void(Peer&)>;
@@ -169,7 +169,7 @@ class PlayedDaemon {
     options.timeout = kLong;
     options.program = "test";
     thread_ = std::thread([this, tls, plays = std::move(plays)] {
-      // OpenSSL writes to clients that have gone. The client under test has to do without this.
+      // OpenSSL raises SIGPIPE for a closed client. The client under test must not need this.
       sigset_t broken_pipe;
       ::sigemptyset(&broken_pipe);
       ::sigaddset(&broken_pipe, SIGPIPE);
@@ -179,7 +179,7 @@ class PlayedDaemon {
           Peer peer(listening_.get(), tls);
           play(peer);
         } catch (const std::runtime_error&) {  // NOLINT(bugprone-empty-catch)
-          // The client left in the middle of the play.
+          // The client disconnected during the play.
         }
       }
     });
@@ -193,7 +193,7 @@ class PlayedDaemon {
     if (thread_.joinable()) thread_.join();
   }
 
-  Options options;  ///< To reach it with.
+  Options options;  ///< How to reach the daemon.
 
  private:
   base::UniqueFd listening_;

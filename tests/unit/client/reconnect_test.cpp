@@ -1,4 +1,4 @@
-// A lost connection, and the ways to wait.
+// Reconnection, and the ways to wait.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <netinet/tcp.h>
@@ -43,7 +43,7 @@ TEST(Reconnecting, TheSubscriptionSurvivesADaemonThatGoesAndComesBack) {
   client.subscribe(wanted);
   EXPECT_EQ(next<v1::Frame>(client).sequence(), 41U);
   first.reset();
-  // Nobody listens there now.
+  // The port has no listener now.
   EXPECT_FALSE(client.next(milliseconds(50)).has_value());
   EXPECT_EQ(client.native_handle(), -1);
   v1::Subscribe seen;
@@ -136,7 +136,7 @@ TEST(Reconnecting, ARequestTriesWhenTheNextAttemptIsDue) {
 TEST(Reconnecting, ABusyDaemonIsAskedAgain) {
   PlayedDaemon daemon({[](Peer& peer) { peer.greet(); },
                        [](Peer& peer) { peer.refuse(v1::ERROR_BUSY, "too many clients"); },
-                       [](Peer& peer) { (void)peer.request(); },  // ends without a word
+                       [](Peer& peer) { (void)peer.request(); },  // ends without an answer
                        [](Peer& peer) {
                          peer.greet();
                          (void)peer.ends_silently();
@@ -162,7 +162,7 @@ TEST(Reconnecting, WhatMoreAttemptsCannotFixIsThrown) {
     EXPECT_STREQ(e.what(), "unknown token");
   }
   EXPECT_THROW((void)client.next(kLong), ProtocolError);
-  // Somebody fixed it.
+  // The third daemon accepts the token.
   (void)next<Reconnected>(client);
 }
 
@@ -228,7 +228,7 @@ TEST(Waiting, RunCallsTheHandlers) {
   EXPECT_THAT(seen, ElementsAre("frame 1", "event 2", "gap after 1", "frame 3"));
 }
 
-// These would wait for ten minutes and more else.
+// Without the stop these would wait for ten minutes and more.
 TEST(Waiting, AStopEndsRunWhileNothingComes) {
   PlayedDaemon daemon({[](Peer& peer) {
     peer.greet();

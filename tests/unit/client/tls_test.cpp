@@ -1,4 +1,4 @@
-// Who the other end is, and that the token goes to nobody else.
+// Checks of the server's certificate; the token is sent to the right server only.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <ifaddrs.h>
@@ -32,7 +32,7 @@ class TlsDaemon : public PlayedDaemon {
   }
 };
 
-/// What the attempt to connect throws, as an E.
+/// The message of the exception E that connecting throws.
 template <typename E>
 std::string refusal(const Options& options) {
   try {

@@ -26,7 +26,7 @@ using testing::HasSubstr;
 using testing::Not;
 using testing::StartsWith;
 
-/// The pipeline says that it uses a calibration.
+/// Lets the pipeline report that it uses the calibration `name`.
 void be_calibrated(Rig& rig, const std::string& name) {
   auto calibration = std::make_shared<calibration::Calibration>();
   calibration->name = name;
@@ -77,7 +77,7 @@ TEST(Calibration, IsExportedOnceUnlessForced) {
   EXPECT_EQ(base::read_file(folder + "/calibration.toml"), "toml of factory");
   EXPECT_EQ(ctl(rig, {"calibration", "download", "2", "-o", folder, "--force"}).code, 0);
   EXPECT_EQ(base::read_file(folder + "/calibration.toml"), "bad");
-  // What is no part of a calibration is not lost, forced or not.
+  // Files that are no part of a calibration are kept, with --force and without.
   base::write_file_atomically(folder + "/notes.txt", "mine");
   EXPECT_EQ(ctl(rig, {"calibration", "download", "1", "-o", folder, "--force"}).code, 1);
   EXPECT_EQ(base::read_file(folder + "/calibration.toml"), "bad");

@@ -1,4 +1,4 @@
-// The completion file in a real bash, and against what the program says of itself.
+// The completion file in a real bash, compared with the program's own help.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -20,7 +20,7 @@ namespace {
 using testing::IsSubsetOf;
 using testing::UnorderedElementsAre;
 
-/// What bash offers for the last of `words`, which are separated by blanks ("" for an empty one).
+/// Words that bash offers for the last of `words`, which are separated by blanks ("" if empty).
 std::set<std::string> complete(const std::string& words) {
   const std::string script =
       "source '" DTACT_SOURCE_DIR "/clients/common/dtact.bash-completion'; COMP_WORDS=(" + words +

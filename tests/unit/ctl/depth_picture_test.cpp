@@ -86,7 +86,7 @@ TEST(Picture, FitsTheTerminal) {
       EXPECT_LE(columns_of(line), static_cast<std::size_t>(columns)) << columns << 'x' << rows;
     }
   }
-  // As wide as high: a character is two pixels high.
+  // The picture is as wide as high: a character is two pixels high.
   const auto lines = picture_of(square, 0.5, {80, 24, Palette::rgb});
   EXPECT_EQ(lines.size(), 23U);
   EXPECT_EQ(columns_of(lines[0]), 44U);

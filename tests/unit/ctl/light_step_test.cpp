@@ -59,9 +59,9 @@ TEST(LightStep, APictureThatStaysIsNoStep) {
 
 TEST(LightStep, AnUnsteadyImageIsNotAtRest) {
   LightStep step(100, 10);
-  std::vector<double> wandering;
-  for (int i = 0; i < 120; ++i) wandering.push_back(i % 2 == 0 ? 30 : 40);
-  EXPECT_EQ(feed(step, wandering), Verdict::restless);
+  std::vector<double> alternating;
+  for (int i = 0; i < 120; ++i) alternating.push_back(i % 2 == 0 ? 30 : 40);
+  EXPECT_EQ(feed(step, alternating), Verdict::restless);
 }
 
 TEST(LightStep, AFrameMissingWhereItMattersIsAGap) {

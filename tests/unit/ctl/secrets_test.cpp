@@ -28,7 +28,7 @@ using testing::ContainsRegex;
 using testing::HasSubstr;
 using testing::MatchesRegex;
 
-/// What the openssl command says of a certificate.
+/// The openssl command's description of a certificate.
 std::string described(const fs::path& certificate) {
   const std::string command = "openssl x509 -noout -text -in '" + certificate.string() + "'";
   FILE* pipe = ::popen(command.c_str(), "r");
@@ -74,7 +74,7 @@ TEST(Cert, ReplacesAPairOnlyOnRequest) {
   EXPECT_NE(base::read_file(folder.path() / "dtactd.crt"), first);
 }
 
-// The digest of DER, as `openssl x509 -fingerprint -sha256` has it.
+// The digest of DER: `openssl x509 -fingerprint -sha256`.
 TEST(Cert, ShowsAFingerprint) {
   const TempFolder folder;
   const fs::path file = folder.path() / "crt";

@@ -1,4 +1,4 @@
-// dtactctl snapshot and dtactctl watch, which take frames.
+// dtactctl snapshot and dtactctl watch, which read frames.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -27,7 +27,7 @@ using testing::AllOf;
 using testing::HasSubstr;
 using testing::StartsWith;
 
-/// Publishes frames until it is told to end.
+/// Publishes frames until its end.
 class Stream {
  public:
   explicit Stream(Rig& rig)

@@ -1,4 +1,4 @@
-// Which daemon the programs talk to, and what they show it.
+// Which daemon the programs connect to, and with which credentials.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-// What dtactctl says of a command line that it does not understand.
+// dtactctl's messages for a command line that it does not understand.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -38,7 +38,7 @@ TEST(Usage, RefusesJsonWhereThereIsNothingToPrint) {
   EXPECT_THAT(reported({"watch", "--draw", "--json"}), HasSubstr("--json"));
 }
 
-// What a program asks its user to run again.
+// The command line that a program asks its user to run again.
 TEST(CommandLine, HoldsEveryOptionThatWasGiven) {
   CLI::App app("test", "dtact-calibrate");
   std::ostringstream out;

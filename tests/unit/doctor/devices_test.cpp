@@ -1,4 +1,4 @@
-// What the doctor says of cameras, the ring and their nodes.
+// The doctor's findings about cameras, the ring and their device files.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <pwd.h>
@@ -47,7 +47,7 @@ TEST(DoctorCamera, OnlyMetadataIsNoCamera) {
   EXPECT_EQ(only_trouble(check_camera(machine, v4l2())).what, "no video node captures");
 }
 
-// As bcm2835-isp registers them on a Raspberry Pi 4 (raspberrypi/linux pull 3565).
+// bcm2835-isp registers these on a Raspberry Pi 4 (raspberrypi/linux pull 3565).
 TEST(DoctorCamera, AnImageProcessorIsNoUsbCamera) {
   FakeMachine machine;
   machine.file("/dev/video14");
@@ -68,11 +68,11 @@ TEST(DoctorCamera, AForbiddenNodeNamesTheGroup) {
   const Finding finding = only_trouble(check_camera(machine, v4l2()));
   EXPECT_EQ(finding.verdict, Verdict::wrong);
   EXPECT_EQ(finding.fix, "sudo usermod -aG video anna, then log in again");
-  // Nobody asked for a camera: worth knowing, not wrong.
+  // No camera is configured: a note, not an error.
   EXPECT_EQ(only_trouble(check_camera(machine, hal::CameraConfig{})).verdict, Verdict::note);
 }
 
-// Root, who may open every node, asks for the service.
+// Root may open every node, so the check is made for the service's user.
 TEST(DoctorCamera, ANodeThatTheServicesUserMayNotOpen) {
   FakeMachine machine;
   machine.file("/dev/video0");
@@ -100,7 +100,7 @@ TEST(DoctorAccess, IsByOwnerGroupAndMode) {
   mode(0660);
   ASSERT_EQ(::chown(node.c_str(), 0, user->pw_gid), 0);
   EXPECT_EQ(access_as("nobody", node), 0);
-  // The kernel looks at the owner's rights alone where the owner asks.
+  // The kernel checks only the owner's bits when the owner asks.
   mode(0066);
   ASSERT_EQ(::chown(node.c_str(), user->pw_uid, 0), 0);
   EXPECT_EQ(access_as("nobody", node), EACCES);
@@ -214,7 +214,7 @@ TEST(DoctorSpi, AForbiddenDeviceOfRootsNeedsTheRuleAndTheGroup) {
   EXPECT_THAT(finding.what, HasSubstr("Permission denied"));
   EXPECT_THAT(finding.fix, HasSubstr("60-dtactd.rules"));
   EXPECT_THAT(finding.fix, HasSubstr("usermod -aG spi anna"));
-  // As the package brings it.
+  // The package installs it here.
   machine.file("/usr/lib/udev/rules.d/60-dtactd.rules");
   EXPECT_EQ(only_trouble(check_spi(machine, spi_ring())).fix,
             "sudo udevadm control --reload && sudo udevadm trigger && sudo usermod -aG spi anna, "
@@ -293,7 +293,7 @@ TEST(DoctorGpio, WhatCanBeWrongWithALine) {
   ring.ws2812.power = {"gpiochip0", 27, false};
   machine.held_line = 27;
   EXPECT_THAT(only_trouble(check_gpio(machine, ring)).what, HasSubstr("in use by \"lcd-reset\""));
-  // The service that is looked at holds its own line.
+  // The service under test holds its own line.
   machine.holder = "\"dtactd\"";
   EXPECT_EQ(only_trouble(check_gpio(machine, ring)).verdict, Verdict::note);
   machine.held_line = -1;

@@ -1,4 +1,4 @@
-// What the doctor prints for its user, and for somebody else.
+// What the doctor prints, for the user of the machine and as a report for others.
 #include "daemon/app/doctor/doctor.hpp"
 
 #include <gmock/gmock.h>
@@ -16,10 +16,10 @@ namespace {
 using testing::HasSubstr;
 using testing::Not;
 
-/// With what may be told, and with what may not.
-class TellingMachine : public PiMachine {
+/// A machine with private names and numbers beside what a report may show.
+class PrivateMachine : public PiMachine {
  public:
-  TellingMachine() {
+  PrivateMachine() {
     file("/proc/device-tree/serial-number", "10000000abcdef01");
     file("/etc/hostname", "annas-gripper\n");
     file("/etc/machine-id", "0123456789abcdef0123456789abcdef\n");
@@ -62,7 +62,7 @@ TEST(Doctor, PrintsAReportAndAnExitStatusThatAgree) {
 }
 
 TEST(DoctorReport, SaysWhatTheMachineIsAndWhatIsWrong) {
-  const TellingMachine machine;
+  const PrivateMachine machine;
   hal::Config config;
   config.camera = v4l2();
   std::ostringstream out;
@@ -81,7 +81,7 @@ TEST(DoctorReport, SaysWhatTheMachineIsAndWhatIsWrong) {
 }
 
 TEST(DoctorReport, NamesNobodyAndNoSerialNumber) {
-  const TellingMachine machine;
+  const PrivateMachine machine;
   hal::Config config;
   config.camera = v4l2();
   std::ostringstream out;

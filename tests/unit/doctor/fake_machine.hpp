@@ -23,7 +23,7 @@ class FakeMachine : public Machine {
   FakeMachine() : Machine(make_folder()) {}
   ~FakeMachine() override { fs::remove_all(below_root("/")); }
 
-  /// Returns where it really lies.
+  /// Returns the file's path on the real disk.
   fs::path file(const std::string& path, const std::string& text = "") {
     fs::create_directories(below_root(path).parent_path());
     std::ofstream(below_root(path)) << text;
@@ -80,7 +80,7 @@ class FakeMachine : public Machine {
       {"/dev/gpiochip0", "pinctrl-rp1", 54, {"GPIO0", "GPIO1"}, {}}};
   int held_line = -1;
   std::string holder = "\"lcd-reset\"";
-  std::map<std::string, std::string> answers;  ///< Of the firmware.
+  std::map<std::string, std::string> answers;  ///< The firmware's answers.
   std::vector<hal::v4l2::SurveyedCamera> attached;
 
  private:
@@ -90,7 +90,7 @@ class FakeMachine : public Machine {
   }
 };
 
-/// The only finding of a verdict other than good.
+/// The only finding whose verdict is not good.
 inline Finding only_trouble(const Findings& findings) {
   Finding trouble;
   int count = 0;
@@ -121,7 +121,7 @@ inline hal::RingConfig spi_ring() {
   return ring;
 }
 
-/// With everything that an SPI ring needs.
+/// A machine with everything that an SPI ring needs.
 class SpiMachine : public FakeMachine {
  public:
   SpiMachine() {

@@ -1,4 +1,4 @@
-// What the doctor says of the board and the system.
+// The doctor's findings about the board and the system.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -28,7 +28,7 @@ TEST(DoctorCoreClock, IsOfInterestOnARaspberryPi4) {
     machine.file("/boot/firmware/config.txt", config);
     EXPECT_TRUE(all_good(check_core_clock(machine, spi_ring()))) << config;
   }
-  // What only begins so is another setting.
+  // A key that only begins with the same letters is another setting.
   machine.file("/boot/firmware/config.txt", "core_freq_min=5000\n");
   EXPECT_EQ(only_trouble(check_core_clock(machine, spi_ring())).verdict, Verdict::note);
   machine.file("/proc/device-tree/model", "Raspberry Pi 5 Model B Rev 1.0");
@@ -67,7 +67,7 @@ TEST(DoctorGroups, AMissingOneIsNamed) {
   const Finding finding = only_trouble(check_groups(machine));
   EXPECT_EQ(finding.what, "missing: gpio; their devices stay root's");
   EXPECT_THAT(finding.fix, HasSubstr("cp systemd/dtactd.sysusers"));
-  // As the package brings it.
+  // The package installs it here.
   machine.file("/usr/lib/sysusers.d/dtactd.conf");
   EXPECT_EQ(only_trouble(check_groups(machine)).fix, "sudo systemd-sysusers");
   machine.file("/etc/group", "gpio:x:986:\nvideo:x:44:anna\nspi:x:999:\n");

@@ -12,7 +12,7 @@ namespace {
 using testing::AllOf;
 using testing::HasSubstr;
 
-/// A Raspberry Pi 5's first chips, in short.
+/// A Raspberry Pi 5's first chips, abridged.
 std::vector<Chip> chips() {
   return {{"/dev/gpiochip0", "pinctrl-rp1", 4, {"ID_SDA", "", "GPIO2", "FAN"}, {"/dev/gpiochip4"}},
           {"/dev/gpiochip10", "gpio-brcmstb@1", 3, {"FAN", "-", "-"}, {}}};

@@ -137,7 +137,7 @@ TEST(Extract, RefusesShapesTheLayoutCannotHave) {
   EXPECT_EQ(extract(Layout::grey, Range::full, payload, 0, none), ExtractStatus::bad_shape);
 }
 
-// A Pi's drivers give memory without caches.
+// A Pi's drivers give uncached memory.
 TEST(Extract, ReadsMemoryWithoutCachesInWideLoads) {
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
   GTEST_SKIP() << "a sanitizer's build is not the one whose loads count";

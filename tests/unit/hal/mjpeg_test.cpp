@@ -90,7 +90,7 @@ TEST_F(GreyDecoderTest, EveryTruncationIsReported) {
   for (std::size_t keep = 1; keep < jpeg.size(); ++keep) {
     ASSERT_EQ(decode(std::span(jpeg).first(keep)), Status::truncated) << keep;
   }
-  EXPECT_EQ(decode(jpeg), Status::ok);  // and the decoder is none the worse
+  EXPECT_EQ(decode(jpeg), Status::ok);  // and the decoder still works
 }
 
 TEST_F(GreyDecoderTest, TruncationHiddenByAnEndMarkerIsReported) {
@@ -108,7 +108,7 @@ TEST_F(GreyDecoderTest, StuffingBeforeTheEndMarkerIsToleratedUpTo16Bytes) {
   };
   EXPECT_EQ(decode(stuffed(16)), Status::ok);
   EXPECT_LE(worst_error(), 3);
-  // Up to eight of them have gone into the decoder's 64 bits and are not counted.
+  // Up to eight of them are already in the decoder's 64 bits and are not counted.
   EXPECT_EQ(decode(stuffed(16 + 8 + 1)), Status::corrupt);
 }
 
@@ -127,7 +127,7 @@ TEST_F(GreyDecoderTest, ProgressiveIsUnsupported) {
 TEST_F(GreyDecoderTest, FramesDoNotInheritTables) {
   ASSERT_EQ(decode(make_jpeg({}, slope)), Status::ok);
   Bytes jpeg = make_jpeg({}, slope);
-  // Without its quantisation tables (marker FFDB becomes a comment, FFFE) a frame means nothing.
+  // A frame without its quantisation tables (marker FFDB becomes a comment, FFFE) is refused.
   for (std::size_t i = 0; i + 1 < jpeg.size(); ++i) {
     if (jpeg[i] == 0xFF && jpeg[i + 1] == 0xDB) jpeg[i + 1] = 0xFE;
   }

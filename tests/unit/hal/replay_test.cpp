@@ -67,7 +67,7 @@ class ReplayTest : public ::testing::Test {
   CameraConfig config;
   fakes::FakeClock clock;
   std::optional<ReplayCamera> opened;
-  Frame frame;  // goes home before the camera
+  Frame frame;  // is destroyed before the camera
 };
 
 TEST_F(ReplayTest, PlaysInTheOrderOfNamesAndLoops) {
@@ -144,7 +144,7 @@ TEST_F(ReplayTest, ALateCallerGetsTheNewest) {
   EXPECT_EQ(frame.info().sequence, 4U);
   EXPECT_EQ(frame.luma().row(0)[0], 20);
   EXPECT_EQ(frame.info().flags, kFrameNormal) << "skipped here, not lost by a camera";
-  EXPECT_EQ(frame.info().ready_ns, kStart + 40 * kMs);  // 5 ms are the caller's
+  EXPECT_EQ(frame.info().ready_ns, kStart + 40 * kMs);  // the caller was 5 ms late
   EXPECT_EQ(camera.report().skipped, 3U);
 }
 
@@ -273,7 +273,7 @@ class ReplayMcap : public ReplayTest {
     std::uint64_t ms;
     std::string bytes;
   };
-  /// A file of one camera's pictures; `topics` cameras, all of them on the last one.
+  /// Writes a file of camera pictures; with several `topics` all are on the last one.
   void record(const std::vector<Picture>& pictures, std::size_t topics = 1) {
     mcap::FileSink sink(config.replay.folder, true);
     mcap::Writer writer(sink);

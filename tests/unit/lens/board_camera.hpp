@@ -10,7 +10,7 @@
 
 namespace dtact::ctl {
 
-/// A camera that looks at a plane, worked out from rays alone: independent of recon::Lens and of
+/// A camera that looks at a plane, computed from rays only: independent of recon::Lens and of
 /// OpenCV's calibration. With (x, y) a ray's slopes and r² = x² + y², it shows the ray at the pixel
 /// centre + focal·(x, y)·(1 + k1·r² + k2·r⁴ + k3·r⁶).
 struct BoardCamera {
@@ -87,7 +87,7 @@ struct BoardCamera {
     const auto below = static_cast<std::size_t>(place_in_table);
     const double part = place_in_table - static_cast<double>(below);
     const cv::Point2d ray = seen / ((1 - part) * factors[below] + part * factors[below + 1]);
-    // a · (X, Y, 0) + place is along the ray: two equations for X and Y.
+    // a · (X, Y, 0) + place lies along the ray: two equations for X and Y.
     const cv::Vec3d t = place();
     const double xx = a(0, 0) - ray.x * a(2, 0);
     const double xy = a(0, 1) - ray.x * a(2, 1);

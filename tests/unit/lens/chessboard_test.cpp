@@ -33,7 +33,7 @@ cv::Mat1b photograph(const BoardCamera& camera) {
   return image;
 }
 
-/// A barrel lens over a board that lies a little aslant.
+/// A barrel lens over a board that is slightly tilted.
 BoardCamera flat() {
   BoardCamera camera;
   camera.k1 = -0.20;
@@ -43,8 +43,8 @@ BoardCamera flat() {
   return camera;
 }
 
-/// The greatest distance in pixels between where the lens and where the camera shows the places of
-/// the board's inside. Turned about its own x axis only, the board is level as it is.
+/// The greatest distance in pixels between the lens's and the camera's positions of the board's
+/// inside. A board that is turned about its own x axis only is level.
 double worst_px(const recon::Lens& lens, const BoardCamera& camera) {
   double worst = 0;
   for (double y = -7.5; y <= 7.5; y += 2.5) {
@@ -57,7 +57,7 @@ double worst_px(const recon::Lens& lens, const BoardCamera& camera) {
   return worst;
 }
 
-/// From the board as `camera` shows it and five more images of it tilted.
+/// A calibration from the board as `camera` shows it and five more images of it tilted.
 ChessboardLens calibrate_tilted(const BoardCamera& camera) {
   std::vector<cv::Mat1b> images{photograph(camera)};
   std::vector<std::string> names{"flat.png"};

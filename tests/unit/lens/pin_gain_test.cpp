@@ -17,8 +17,8 @@ using testing::HasSubstr;
 
 constexpr double kPxPerMm = 16;
 
-/// Two images on which each of 7×9 pins darkens by `levels` of its place in millimetres, scattered
-/// by 5 %, under `light`.
+/// Two images with 7×9 pins. Each pin darkens by `levels` of its place in millimetres, scattered by
+/// 5 %, under `light`.
 struct GainScene {
   cv::Mat1f reference = cv::Mat1f(300, 400);
   cv::Mat1f frame;

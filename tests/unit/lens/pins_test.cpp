@@ -24,12 +24,12 @@ struct Scene {
   BoardCamera camera;
   Board board;
   double depth_levels = 20;
-  double turn = 0;                        ///< Of the board in the plane, degrees.
+  double turn = 0;                        ///< Rotation of the board in its plane, degrees.
   std::set<std::pair<int, int>> missing;  ///< Row, column.
   std::set<std::pair<int, int>> astray;   ///< Half a millimetre right of their places.
 
   Scene() {
-    // Small: what a pin costs to find goes with its pixels.
+    // Small, because the cost of finding a pin grows with its pixels.
     camera.width = 400;
     camera.height = 300;
     camera.focal = 350;
@@ -45,15 +45,15 @@ struct Scene {
     return {std::cos(angle) * flat.x - std::sin(angle) * flat.y,
             std::sin(angle) * flat.x + std::cos(angle) * flat.y};
   }
-  [[nodiscard]] cv::Mat1f untouched() const { return camera.photograph(light, 1, 0.3); }
+  [[nodiscard]] cv::Mat1f reference() const { return camera.photograph(light, 1, 0.3); }
   [[nodiscard]] cv::Mat1f pressed() const {
     return camera.photograph(
         [&](cv::Point2d mm) { return light(mm) * (1 - depth_levels / 150 * dent(mm)); }, 1, 0.3);
   }
-  [[nodiscard]] PinPress find() const { return find_pins(untouched(), pressed(), board); }
+  [[nodiscard]] PinPress find() const { return find_pins(reference(), pressed(), board); }
 
  private:
-  /// Of the nearest pin: 1 at its centre.
+  /// Indentation by the nearest pin: 1 at its centre.
   [[nodiscard]] double dent(cv::Point2d mm) const {
     constexpr double kWidth = 0.45;  // mm, standard deviation of a pin's blurred dent
     const double angle = turn * std::numbers::pi / 180;

@@ -74,7 +74,7 @@ TEST(PointFit, LeftOutResidualsAreTheNoise) {
 }
 
 TEST(PointFit, AMisplacedMarkIsSeenOnlyWhenLeftOut) {
-  // A corner mark bends a lens of few marks towards itself.
+  // A mark in a corner bends a lens of few marks towards itself.
   std::vector<Mark> marks = marks_of(tilted_barrel(), 0);
   marks.front().px.x += 8;  // 0.46 mm
   const auto left_out = leave_one_out(marks, LensModel::radial1);

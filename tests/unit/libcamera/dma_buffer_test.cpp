@@ -18,7 +18,7 @@ using libcamera_test::KernelDouble;
 using libcamera_test::new_kernel;
 using testing::Test;
 
-/// Stands for a heap's node: it opens, and the double answers for it.
+/// A heap's node: it opens, and the double answers for it.
 constexpr std::array kNodes{"/dev/dma_heap/none such", "/dev/null"};
 
 lc::StreamConfiguration nv12() {

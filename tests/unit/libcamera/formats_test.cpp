@@ -56,7 +56,7 @@ TEST(Formats, SaysLimitedWhereFullRangeIsNotGranted) {
   EXPECT_FALSE(choose(camera, asked(800, 600, "yuv420"), Sensor::colour).format.full_range);
 }
 
-// Else its limited range would be taken for full, since what is asked for stays there.
+// Otherwise its limited range would count as full, since the requested value stays there.
 TEST(Formats, AsksNoColourSpaceOfAPipelineThatKnowsNone) {
   IgnorantCamera camera;
   const Got got = choose(camera, asked(800, 600), Sensor::none);
@@ -96,7 +96,7 @@ TEST(Formats, LetsTheImageProcessorScaleAMonoSensor) {
   EXPECT_TRUE(got.format.full_range);
 }
 
-// A Pi 4 would grant R8 at 640x480: the mosaic of a colour sensor under the name of grey.
+// A Pi 4 would grant R8 at 640x480: the mosaic of a colour sensor, named grey.
 TEST(Formats, TakesNoMosaicForGrey) {
   PiCamera camera(PiCamera::Board::pi4, kImx219);
   EXPECT_STREQ(choose(camera, asked(640, 480), Sensor::colour).choice.name, "NV12");

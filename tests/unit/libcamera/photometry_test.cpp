@@ -11,10 +11,10 @@ namespace {
 
 namespace lc = libcamera;
 
-/// A double of a Raspberry Pi's sensor and its IPA, after src/ipa/rpi/common/ipa_base.cpp: no
-/// default exposure or gain is listed (ipaControls), durations are clamped to the mode's
-/// (applyFrameDurations()) and exposures to what a frame holds (applyAGC()), both without a word,
-/// and the metadata say what was done (reportMetadata()).
+/// A double of a Raspberry Pi's sensor and its IPA, after src/ipa/rpi/common/ipa_base.cpp. It lists
+/// no default exposure or gain (ipaControls). It clamps durations to the mode's
+/// (applyFrameDurations()) and exposures to the frame's (applyAGC()), both silently. The metadata
+/// hold the values that were used (reportMetadata()).
 struct PiSensor {
   std::int64_t shortest_us = 8333;  ///< Frame of the mode.
   std::int64_t line_us = 15;
@@ -104,7 +104,7 @@ TEST(LibcameraPhotometry, TakesTheNearestExposureThatTheSensorHas) {
   const CameraControl entry = control(requested_controls.controls, "exposure_time");
   EXPECT_EQ(entry.verdict, ControlVerdict::confirmed);
   EXPECT_EQ(entry.value, 495);
-  // It stays that, and is no control that moved.
+  // The value stays, so no control has moved.
   EXPECT_EQ(PhotometricLock::compare(readings, requested_controls.controls), "");
 }
 

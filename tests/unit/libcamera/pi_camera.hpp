@@ -15,7 +15,7 @@ namespace lc = libcamera;
 /// 'R16 ' of drm_fourcc.h; libcamera 0.0.3 has no name for it.
 constexpr lc::PixelFormat kR16(0x20363152);
 
-/// A double of a Raspberry Pi's camera, for one stream: it bends what is asked for as raspberrypi's
+/// A double of a Raspberry Pi's camera, for one stream: it changes requests as raspberrypi's
 /// libcamera does, in src/libcamera/pipeline/rpi/common/pipeline_base.cpp (generateConfiguration(),
 /// validateColorSpaces(), validate()), rpi/vc4/vc4.cpp and rpi/pisp/pisp.cpp (platformValidate()).
 class PiCamera : public lc::CameraConfiguration {
@@ -50,8 +50,8 @@ class PiCamera : public lc::CameraConfiguration {
       if (stream.pixelFormat != lc::formats::NV12 && stream.pixelFormat != lc::formats::YUYV) {
         stream.pixelFormat = lc::formats::YUV420;
       }
-      // findValidColorSpace(): sYCC, SMPTE 170M and Rec. 709 go through; the driver has the last
-      // word.
+      // findValidColorSpace(): sYCC, SMPTE 170M and Rec. 709 pass; the driver decides
+      // last.
       if (granted_) stream.colorSpace = granted_;
       stream.stride = (stream.size.width + 63) / 64 * 64;
     }
@@ -67,7 +67,7 @@ class PiCamera : public lc::CameraConfiguration {
     for (const Mode& mode : modes_) {
       if (score(mode, stream.size, asked) < score(*best, stream.size, asked)) best = &mode;
     }
-    // The order of colours that was asked for, here none, is kept; the size and the bits are the
+    // The requested order of colours, here none, is kept; the size and the bits are the
     // sensor's.
     if (board_ == Board::pi5) {
       stream.pixelFormat = kR16;
@@ -79,7 +79,7 @@ class PiCamera : public lc::CameraConfiguration {
     stream.colorSpace = lc::ColorSpace::Raw;
   }
 
-  /// As findBestFormat() weighs: a bit costs 500 pixels.
+  /// findBestFormat()'s score: a bit costs 500 pixels.
   static unsigned long score(const Mode& mode, const lc::Size& size, unsigned bits) {
     const auto off = [](unsigned a, unsigned b) {
       return static_cast<unsigned long>(std::labs(static_cast<long>(a) - static_cast<long>(b)));
@@ -93,7 +93,7 @@ class PiCamera : public lc::CameraConfiguration {
   std::optional<lc::ColorSpace> granted_;
 };
 
-/// A pipeline that leaves colour spaces alone, and has NV12 only: the virtual one (virtual.cpp:
+/// A pipeline that ignores colour spaces and has NV12 only: the virtual one (virtual.cpp:
 /// VirtualCameraConfiguration::validate()).
 class IgnorantCamera : public lc::CameraConfiguration {
  public:

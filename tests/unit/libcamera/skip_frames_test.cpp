@@ -12,7 +12,7 @@ using live::DequeueStatus;
 
 constexpr std::int64_t kLong = std::numeric_limits<std::int64_t>::max();
 
-/// Gives the statuses in turn, `none` after the last; frame n is in buffer n.
+/// Returns the statuses in turn, `none` after the last; frame n is in buffer n.
 class Script final : public live::Source {
  public:
   explicit Script(std::vector<DequeueStatus> statuses) : statuses_(std::move(statuses)) {}

@@ -1,6 +1,6 @@
 // The session over libcamera's own virtual camera, which libcamera has since 0.4 where it was built
-// with it: Debian 13 has. It needs a file below /usr/share, which is made in a file system of this
-// process's own.
+// with it: Debian 13 has. It needs a file below /usr/share; the test makes it in a file system of
+// its own process.
 #include <gtest/gtest.h>
 #include <libcamera/camera_manager.h>
 #include <sched.h>
@@ -20,9 +20,9 @@
 #include "hal/live/source.hpp"
 #include "tests/unit/libcamera/kernel_double.hpp"
 
-// libcamera 0.4.0's virtual camera leaves a frame's metadata as the memory was (virtual.cpp:
-// queueRequestDevice()): zeros, then, for the whole program. Not inlined:
-// gcc would take what one of the two leaves of itself for a mismatch.
+// libcamera 0.4.0's virtual camera does not initialise a frame's metadata (virtual.cpp:
+// queueRequestDevice()), so this program allocates zeroed memory. Not inlined: gcc would report
+// a mismatch of new and delete.
 [[gnu::noinline]] void* operator new(std::size_t size) {
   if (void* memory = std::calloc(1, size); memory != nullptr) return memory;
   throw std::bad_alloc();
@@ -153,7 +153,7 @@ TEST_F(VirtualCamera, RefusesARateThatTheCameraDoesNotHave) {
 TEST_F(VirtualCamera, GoesOnWithoutAHeap) {
   libcamera_test::kernel().has_memory = false;
   try {
-    (void)open(60);  // where libcamera has memory of its own for it
+    (void)open(60);  // libcamera allocates once here
   } catch (const live::DeviceError& e) {
     EXPECT_NE(std::string(e.what()).find("cannot get buffers of bars"), std::string::npos)
         << e.what();

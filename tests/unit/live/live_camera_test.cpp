@@ -24,7 +24,7 @@ using std::chrono::milliseconds;
 constexpr int kSide = 16;
 constexpr std::size_t kPixels = 256;
 
-/// A source of grey frames that lends its payloads.
+/// A source of grey frames that leases its payloads.
 class LeasingSource final : public Source {
  public:
   ~LeasingSource() override { *destroyed = true; }
@@ -85,7 +85,7 @@ class LeasingSource final : public Source {
   std::shared_ptr<bool> destroyed = std::make_shared<bool>(false);
   std::array<std::array<std::uint8_t, kRoom>, 3> memory{};
   std::deque<int> filled;
-  std::vector<int> index_to_requeue;  // what came back
+  std::vector<int> index_to_requeue;  // requeued buffers
   std::uint32_t sequence = 0;
   int taken = 0;
 };
@@ -97,7 +97,7 @@ CameraConfig small() {
   return c;
 }
 
-/// A camera whose opener hands out `source` until it is taken away.
+/// A camera whose opener returns `source` until it is taken away.
 struct Rig {
   std::shared_ptr<LeasingSource> source = std::make_shared<LeasingSource>();
   LiveCamera camera{small(), "test", "nothing yet", [this]() -> Opened {
@@ -106,7 +106,7 @@ struct Rig {
                     }};
 };
 
-// What libcamera starts within inherits priority and pinning from the thread that opens.
+// Threads that libcamera starts inside inherit priority and pinning from the thread that opens.
 TEST(LiveCamera, IsOpenedAnewOnAThreadThatIsNeitherPinnedNorRealTime) {
   const cpu_set_t allowed = base::allowed_cpus();
   cpu_set_t seen;
@@ -125,7 +125,7 @@ TEST(LiveCamera, IsOpenedAnewOnAThreadThatIsNeitherPinnedNorRealTime) {
   for (int cpu = 0; cpu < CPU_SETSIZE; ++cpu) {
     if (CPU_ISSET(static_cast<std::size_t>(cpu), &allowed)) last = cpu;
   }
-  // FIFO where it is allowed; the pinning always is.
+  // FIFO is used where it is allowed; pinning always is.
   base::RtThread capture({.name = "capture", .cpu = last, .fifo_priority = 1}, [&] {
     Frame frame;
     (void)camera.grab(frame, milliseconds(20));
@@ -202,7 +202,7 @@ TEST(LiveCamera, AFrameOutlivesTheSourceItWasLentFrom) {
   rig.source.reset();
   Frame none;
   EXPECT_EQ(rig.camera.grab(none, milliseconds(250)), GrabStatus::unplugged);
-  EXPECT_EQ(rig.camera.report().state, CameraState::busy);  // as the opener says now
+  EXPECT_EQ(rig.camera.report().state, CameraState::busy);  // the opener's present answer
   EXPECT_EQ(rig.camera.report().fix, "busy: wait");
   EXPECT_FALSE(*destroyed);
   EXPECT_EQ(frame.luma().row(3)[3], 50);
@@ -211,8 +211,8 @@ TEST(LiveCamera, AFrameOutlivesTheSourceItWasLentFrom) {
   EXPECT_EQ(rig.camera.report().disconnects, 1U);
 }
 
-// The capture thread keeps its frame while the camera is away, and another source numbers its
-// buffers alike.
+// The capture thread keeps its frame while the camera is away; the next source uses the same buffer
+// numbers.
 TEST(LiveCamera, AFrameOfTheSourceBeforeGoesToNoOther) {
   Rig rig;
   rig.camera.start();
@@ -281,8 +281,8 @@ TEST(LiveCamera, AGapWithBuffersToFillIsTheCamerasLoss) {
   EXPECT_EQ(rig.camera.report().skipped, 0U);
 }
 
-// The driver had no buffer to put the frames into, since this process held or had not looked at
-// any of them: no cable and no hub is to blame.
+// The driver had no free buffer for the frames, because this process held all of them: the cable
+// and the hub are not the cause.
 TEST(LiveCamera, AGapWithoutABufferToFillIsSkippedNotLost) {
   Rig rig;
   rig.camera.start();
@@ -297,7 +297,7 @@ TEST(LiveCamera, AGapWithoutABufferToFillIsSkippedNotLost) {
   EXPECT_EQ(frame.info().sequence, 8U);
   EXPECT_EQ(rig.camera.report().lost, 0U);
   EXPECT_EQ(rig.camera.report().skipped, 6U);
-  // From here on it has buffers again.
+  // Buffers are free again from here on.
   rig.source->sequence += 1;
   rig.source->fill(1, 70);
   ASSERT_EQ(rig.camera.grab(frame, milliseconds(100)), GrabStatus::ok);
@@ -334,7 +334,7 @@ TEST(LiveCamera, SilenceIsAStallAndIsRestarted) {
   EXPECT_EQ(rig.camera.grab(frame, milliseconds(200)), GrabStatus::timeout);
   EXPECT_EQ(rig.camera.report().state, CameraState::stalled);
   EXPECT_NE(rig.camera.report().fix.find("sends nothing"), std::string::npos);
-  // Three seconds later the source is let go; this one cannot be opened twice.
+  // The source is closed three seconds later; this one cannot be opened twice.
   GrabStatus status = GrabStatus::timeout;
   for (int i = 0; i < 1000 && !rig.source->stopped; ++i) {
     status = rig.camera.grab(frame, milliseconds(20));
@@ -379,7 +379,7 @@ TEST(LiveCamera, TheFirstFrameAfterARestartSaysSo) {
   EXPECT_EQ(frame.info().flags, kFrameNormal);
 }
 
-// The silence of the camera before does not count for the one that was opened anew.
+// The previous camera's silence does not count for the reopened one.
 TEST(LiveCamera, AReopenedCamerasFirstFrameIsWaitedFor) {
   Rig rig;
   rig.camera.start();

@@ -28,7 +28,7 @@ TEST(SearchThrottle, LooksSeldomUnlessNodesAreNew) {
 
   std::ofstream(devices / "sda").close();
   EXPECT_FALSE(pace.due(begin + 3s, date()));
-  // A change of it before the date is asked for is at most that old.
+  // A change before the date is read is at most this old.
   const std::chrono::system_clock::time_point made = date();
   std::ofstream(devices / "media0").close();
   EXPECT_TRUE(pace.due(begin + 3s, made + 1s));
@@ -45,7 +45,7 @@ TEST(SearchThrottle, LooksSeldomWithoutAFolderOfDevices) {
   EXPECT_FALSE(pace.due(begin + 1s, std::chrono::system_clock::now()));
 }
 
-// Of several attempts a second one looks; the others say what it found.
+// The second of several attempts looks; the others report what it found.
 TEST(Paced, FailsWithoutALookUntilItIsTime) {
   int looks = 0;
   const Opener open = paced(

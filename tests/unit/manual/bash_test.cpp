@@ -1,4 +1,4 @@
-// Completion files in a real bash; that of dtactctl and dtact-calibrate is tested with dtactctl.
+// Completion files in a real bash; dtactctl's and dtact-calibrate's are tested with dtactctl.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -21,7 +21,7 @@ const Completion kDtactd{"daemon/dtactd.bash-completion", "_dtactd"};
 const Completion kPerceive{"clients/perceive/dtact-perceive.bash-completion", "_dtact_perceive"};
 const Completion kWeb{"clients/web/dtact-web.bash-completion", "_dtact_web"};
 
-/// What bash offers for the last of `words`, which are separated by blanks.
+/// Words that bash offers for the last of `words`, which are separated by blanks.
 std::set<std::string> offered(const Completion& completion, const std::string& words) {
   const std::string command = "bash --norc -c 'source \"" DTACT_SOURCE_DIR "/" + completion.file +
                               "\"; COMP_WORDS=(" + words +
@@ -59,7 +59,7 @@ TEST(Bash, OffersUnits) {
               testing::UnorderedElementsAre("mm", "m"));
 }
 
-/// Of a program and each of its commands.
+/// Checks the options of a program and of each of its commands.
 void expect_every_option(const Completion& completion, const Command& program) {
   EXPECT_EQ(offered(completion, program.name + " --"), options_of(program));
   for (const Command& command : program.commands) {

@@ -20,8 +20,8 @@ std::vector<std::string> split(const std::string& text, char at) {
   return parts;
 }
 
-/// In the order of the alphabet: CLI11 keeps pointers, whose order is another in each process.
-/// Options alone need and exclude each other.
+/// Sorted by name: CLI11 keeps pointers, whose order differs between processes.
+/// Only options need and exclude each other.
 std::vector<std::string> names_of(const std::set<CLI::Option*>& options) {
   std::vector<std::string> names;
   for (const CLI::Option* option : options) names.push_back("--" + option->get_lnames().at(0));
@@ -29,7 +29,7 @@ std::vector<std::string> names_of(const std::set<CLI::Option*>& options) {
   return names;
 }
 
-/// What CLI11 writes behind an option's type, as in "FLOAT:FLOAT in [0.1 - 100]".
+/// Parses CLI11's text behind an option's type, as in "FLOAT:FLOAT in [0.1 - 100]".
 void read_check(const std::string& check, Argument& argument) {
   static const std::regex range(R"(\S+ in \[(\S+) - (\S+)\])");
   std::smatch match;
@@ -49,7 +49,7 @@ void read_check(const std::string& check, Argument& argument) {
   }
 }
 
-/// The name of a value. CLI11's types of numbers mean nothing to who types them.
+/// The name of a value. CLI11's types of numbers mean nothing to users.
 std::string value_of(const std::string& type) {
   return type == "UINT" || type == "INT" || type == "FLOAT" ? "NUMBER" : type;
 }

@@ -15,20 +15,20 @@
 namespace dtact::manual {
 namespace {
 
-/// A key as config/dtactd.toml has it.
+/// A key of config/dtactd.toml.
 struct Entry {
   std::string path;
   std::string comment;  ///< Behind the value.
-  bool set = true;      ///< Not commented out: the default is a value, and the same everywhere.
+  bool set = true;      ///< Not commented out: the default is the same on all machines.
 };
 
-/// Keys below one comment, which is about them all, or with none.
+/// Keys below a common comment, or with none.
 struct Group {
   std::string comment;
   std::vector<Entry> entries;
 };
 
-/// What the daemon accepts and has, by path.
+/// A key's default and allowed values in the daemon, by path.
 struct Fact {
   std::string allowed;
   std::string preset;
@@ -39,7 +39,7 @@ std::map<std::string, Fact> facts() {
   std::map<std::string, Fact> result;
   for (const app::Key& key : app::bind_keys(config)) {
     std::string allowed = key.allowed;
-    // Keys without a unit leave a blank where it would stand.
+    // Keys without a unit leave a blank in its place.
     allowed = std::regex_replace(allowed, std::regex(" +(,|$)"), "$1");
     result[key.path] = {std::move(allowed), key.show()};
   }
@@ -51,7 +51,7 @@ std::set<std::string> words_of(const std::string& text) {
   return {std::sregex_token_iterator(text.begin(), text.end(), word), std::sregex_token_iterator()};
 }
 
-/// What the page says of a key; a comment and what is allowed do not repeat each other.
+/// The page's text for a key; its comment and its allowed values do not repeat each other.
 std::string body(const Entry& key, const std::string& above, const Fact& fact) {
   std::string text = above.empty() ? "" : sentence(above) + " ";
   const std::set<std::string> comment = words_of(above + " " + key.comment);
@@ -81,7 +81,7 @@ class Page {
  private:
   void read(const std::string& line) {
     static const std::regex table(R"(\[(.*)\])");
-    // A value has no '#'. Commented out it stands in a line of its own.
+    // A value has no '#'. A key that is commented out has a line of its own.
     static const std::regex key(R"((# )?(\w+) = ([^#]*?)\s*(?:# (.*))?)");
     std::smatch match;
     if (line.empty()) {
@@ -106,7 +106,7 @@ class Page {
     if (missing_.erase(key.path) == 0) {
       throw std::runtime_error("config/dtactd.toml has " + key.path + ", which dtactd has not");
     }
-    // A comment above keys that have none of their own is theirs; else it is the table's.
+    // A comment above keys without comments describes them; else it describes the table.
     if (!key.comment.empty()) {
       if (group_.entries.empty()) paragraph();
       end_group();
@@ -125,7 +125,7 @@ class Page {
 
   void end_group() {
     if (group_.entries.empty()) {
-      // The first lines of the file are about all of it.
+      // The first lines of the file describe all of it.
       if (introduction_.empty()) {
         introduction_ = std::exchange(group_.comment, {});
       }

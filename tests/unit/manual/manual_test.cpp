@@ -1,4 +1,4 @@
-// The manual pages and completions in the tree are those that the programs' own texts make.
+// The tracked manual pages and completions equal those that the programs' texts make.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -27,7 +27,7 @@ TEST(Manual, IsThatOfTheProgramsAndTheConfiguration) {
   }
 }
 
-/// What `pattern` finds in the committed page.
+/// Matches of `pattern` in the tracked page.
 std::set<std::string> found(const std::string& page, const std::string& pattern) {
   const std::string text = base::read_file(kRoot / page);
   const std::regex regex(pattern);
@@ -54,9 +54,9 @@ TEST(Manual, RefusesAFileThatLacksAKeyOrHasOneTooMany) {
 
 TEST(Manual, SaysOfAKeyItsCommentWhatIsAllowedAndTheDefault) {
   const std::string page = base::read_file(kRoot / "config/dtactd.toml.5");
-  // The comment in front of it.
+  // The comment above the key.
   EXPECT_THAT(page, HasSubstr("\\fBcamera.light_delay_frames\\fR\nFrames after a light change"));
-  // Behind it; and nothing twice where the comment is only the range.
+  // The comment behind the key; nothing twice where the comment is only the range.
   EXPECT_THAT(
       page,
       HasSubstr("\\fBcamera.sim.seed\\fR\nOf the noise and nothing else. A whole number, 0 …"));
@@ -64,13 +64,13 @@ TEST(Manual, SaysOfAKeyItsCommentWhatIsAllowedAndTheDefault) {
       page,
       HasSubstr(
           "\\fBcamera.width\\fR\nA whole number, 16 … 8192 (pixels). Default: \\fB800\\fR.\n"));
-  // Nor the choices that the comment explains.
+  // Choices that the comment explains are not listed.
   EXPECT_THAT(page, testing::Not(HasSubstr("One of \"null\", \"sim\"")));
-  // Several below one comment.
+  // Several keys below one comment.
   EXPECT_THAT(
       page,
       HasSubstr("\\fBnet.tls_certificate\\fR\n.TQ\n\\fBnet.tls_key\\fR\nWith both TCP speaks"));
-  // What is only commented out has a default of each machine's own.
+  // The default of a commented key depends on the machine.
   EXPECT_THAT(page, HasSubstr("\\fBcapture.cpu\\fR\nA whole number, 0 … 1023, or false.\n"));
 }
 

@@ -19,7 +19,7 @@ std::string escaped(std::string_view text) {
       case '-':
         result += "\\-";
         break;
-      // Elsewhere an accent, a dash and a quotation mark of print: groff_char(7).
+      // Unescaped these print an accent, a dash and a typographic quotation mark: groff_char(7).
       case '^':
         result += "\\(ha";
         break;

@@ -5,17 +5,17 @@
 
 namespace dtact::manual {
 
-/// `text` for a page in the man(7) macros: signs that roff would read or turn into others are
-/// escaped (every hyphen, so that options and paths can be copied), `code` becomes bold.
+/// `text` for a page in the man(7) macros: escapes signs that roff would interpret or replace
+/// (every hyphen, so that options and paths can be copied), `code` becomes bold.
 [[nodiscard]] std::string escaped(std::string_view text);
 
-[[nodiscard]] std::string bold(std::string_view text);    ///< Escapes.
-[[nodiscard]] std::string italic(std::string_view text);  ///< Escapes.
+[[nodiscard]] std::string bold(std::string_view text);    ///< Escapes `text`.
+[[nodiscard]] std::string italic(std::string_view text);  ///< Escapes `text`.
 
-/// Lines of at most 80 columns that roff fills into one paragraph, of `words`, which are escaped.
+/// One paragraph of `words`, which are escaped, in lines of at most 80 columns.
 [[nodiscard]] std::string filled(const std::string& words);
 
-/// The first lines of a page, what says that it is generated included. `volume`: "User Commands".
+/// The first lines of a page, with the note that it is generated. `volume`: "User Commands".
 [[nodiscard]] std::string page_head(const std::string& name, int section,
                                     const std::string& volume);
 

@@ -8,7 +8,7 @@
 namespace dtact::manual {
 namespace {
 
-/// In single quotes, as a word of a shell.
+/// The text in single quotes, as one word of a shell.
 std::string in_quotes(const std::string& text) {
   std::string result = "'";
   for (const char sign : text)
@@ -25,7 +25,7 @@ std::string with_backslashes(const std::string& text, const std::string& signs) 
   return result;
 }
 
-/// What completes a value: zshcompsys(1), _arguments. A blank completes nothing and shows the name.
+/// The action that completes a value: zshcompsys(1), _arguments. A blank only shows the name.
 std::string action(const Argument& argument) {
   if (!argument.choices.empty()) return fmt::format("({})", fmt::join(argument.choices, " "));
   if (argument.value == "FILE") return "_files";
@@ -43,7 +43,7 @@ std::string option_spec(const Argument& option) {
   const std::string text = "[" + with_backslashes(option.text, "[]\\") + "]" +
                            (option.value.empty() ? "" : value(option, option.value));
   std::vector<std::string> others = option.excludes;
-  // One that ends the program stands alone.
+  // An option that ends the program stands alone.
   const bool ends = option.names.back() == "--help" || option.names.back() == "--version";
   if (ends) others = {"-", "*"};
   if (!option.repeats && !ends) {
@@ -70,8 +70,8 @@ std::string specs(const Command& command) {
   return words;
 }
 
-/// The function for a program or command with commands below it, those below first. `locals`: lines
-/// that it begins with, which those below see.
+/// The function for a program or command with commands below it, whose functions come first.
+/// `locals`: its first lines, which the functions below see.
 std::string function(const std::string& name, const Command& command, const std::string& locals) {
   std::string before;
   std::string list;

@@ -1,4 +1,4 @@
-// zsh's completions in a real zsh, against what the programs say of themselves.
+// zsh's completions in a real zsh, compared with the programs' own help.
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -38,7 +38,7 @@ class Zsh : public ::testing::Test {
     if (!folder_.empty()) fs::remove_all(folder_);
   }
 
-  /// What is offered at the end of each line.
+  /// The words offered at the end of each line.
   [[nodiscard]] std::map<std::string, Words> offers(const std::vector<std::string>& lines) const {
     std::string command =
         fmt::format("cd '{0}' && timeout 100 '{1}/tests/unit/manual/zsh_offers.zsh' '{0}'",
@@ -69,7 +69,7 @@ Words long_names(const std::vector<Argument>& options) {
   return names;
 }
 
-/// What has to be offered behind each command line of a program with commands.
+/// Collects the words that must be offered behind each command line of a program with commands.
 void collect(const std::string& line, const Command& command, const Words& everywhere,
              std::map<std::string, Words>& expected) {
   Words options = long_names(command.options);
@@ -111,7 +111,7 @@ TEST_F(Zsh, OffersValuesAndFiles) {
       {"dtactctl calibration upload ", {"calibration"}},
       {"dtact-calibrate apply --calibration ", {"calibration"}},
       {"dtactctl led --brightness ", {}},
-      // Not what cannot stand beside it: --summary.
+      // --summary is not offered: it excludes --draw.
       {"dtactctl watch --draw --s", {"--seconds"}},
       {"dtactctl --port 7 s", {"status", "snapshot"}}};
   std::vector<std::string> lines;

@@ -1,5 +1,5 @@
-// mcap_sample write FILE: a file with all that the writer writes.
-// mcap_sample read FILE: what the reader finds in one, a line each.
+// mcap_sample write FILE: writes a file with everything that the writer can write.
+// mcap_sample read FILE: prints what the reader finds, a line each.
 #include <exception>
 #include <iostream>
 #include <set>

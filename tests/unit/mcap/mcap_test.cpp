@@ -28,7 +28,7 @@ using testing::IsEmpty;
 using testing::SizeIs;
 using testing::ThrowsMessage;
 
-// Both were made by a few lines of Python (struct, zlib) from the specification, not by this code.
+// A few lines of Python (struct, zlib) made both from the specification, without this code.
 
 /// A schema, a channel, an attachment, a metadata record and their summary; no message.
 constexpr const char* kWritten =
@@ -46,7 +46,7 @@ constexpr const char* kWritten =
     "000000000e11000000000000000a220100000000000048000000000000000e11000000000000000d6a01000000"
     "0000001e000000000000000e11000000000000000b880100000000000037000000000000000214000000000000"
     "00d300000000000000bf01000000000000886d56cf894d434150300d0a";
-/// What this writer never makes: no summary, a chunk of zstd (one raw block) that holds its
+/// Contents that this writer never makes: no summary, a chunk of zstd (one raw block) with its
 /// channel, one without compression and CRC, a message outside of chunks, a record of a later
 /// version.
 constexpr const char* kScanned =
@@ -81,7 +81,7 @@ std::string to_hex(std::string_view bytes) {
   return hex;
 }
 
-/// Takes everything up to `room` bytes.
+/// Accepts up to `room` bytes.
 class MemorySink final : public Sink {
  public:
   void append(std::string_view more) override {
@@ -178,7 +178,7 @@ TEST_F(Mcap, ReadsBackWhatItWrote) {
   Writer writer(sink);
   add_messages(writer);
   writer.finish();
-  // A hundred equal bytes a message: compressed indeed.
+  // A hundred equal bytes a message: they are compressed.
   EXPECT_LT(sink.bytes.size(), 2500U);
   write(sink.bytes);
   const Reader reader(file());
@@ -241,7 +241,7 @@ TEST_F(Mcap, AFullDiskLosesTheOpenChunkOnly) {
   writer.add(Message{channel, 0, 2000, 2000, noise});
   EXPECT_THROW(writer.flush(), std::system_error);
   EXPECT_EQ(writer.open_bytes(), 0U);
-  writer.finish();  // fits into what is left
+  writer.finish();  // fits into the rest
   write(sink.bytes);
   const Reader reader(file());
   EXPECT_EQ(reader.damage(), "");
@@ -268,11 +268,11 @@ TEST_F(Mcap, SaysWhereAFileIsDamaged) {
   flipped[index - 1] = static_cast<char>(flipped[index - 1] ^ 1);
   EXPECT_THAT(failure(flipped),
               ThrowsMessage<Error>(AllOf(HasSubstr("a.mcap: byte "), HasSubstr("chunk"))));
-  // Its announced size.
+  // The size in its header.
   std::string huge = sink.bytes;
   huge[begin + kRecordHead + 16 + 7] = '\x7f';
   EXPECT_THAT(failure(huge), ThrowsMessage<Error>(HasSubstr("at most 268435456 are read")));
-  // A byte of the summary: the data are gone through instead.
+  // A byte of the summary is damaged: the reader scans the data instead.
   std::string summary = sink.bytes;
   summary[summary.size() - 60] = static_cast<char>(summary[summary.size() - 60] ^ 1);
   write(summary);
@@ -287,7 +287,7 @@ TEST_F(Mcap, AnIndexThatPointsAtARecordAgainAndAgainIsLeft) {
   Writer writer(sink);
   writer.add(Metadata{"m", {{"long", std::string(10'000, 'x')}}});
   writer.finish();
-  // The record of the index: its kind, length, place, the other's length and name.
+  // The index's record: its kind, length, place, the other's length and name.
   const std::size_t at = sink.bytes.find(std::string("\x0d\x15\0\0\0\0\0\0\0", 9));
   ASSERT_NE(at, std::string::npos);
   const std::string entry = sink.bytes.substr(at, 9 + 0x15);

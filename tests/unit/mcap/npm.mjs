@@ -1,4 +1,4 @@
-// npm.mjs read FILE, npm.mjs write FILE: as mcap_sample, by @mcap/core.
+// npm.mjs read FILE, npm.mjs write FILE: the same as mcap_sample, by @mcap/core.
 import { McapIndexedReader, McapStreamReader, McapWriter } from "@mcap/core";
 import { open } from "node:fs/promises";
 import { readFileSync } from "node:fs";
@@ -38,7 +38,7 @@ if (verb === "read") {
               s.attachmentCount, s.metadataCount, s.chunkCount, String(s.messageStartTime),
               String(s.messageEndTime),
               [...s.channelMessageCounts].map(([id, count]) => `${id}:${count}`).join(","));
-  // From front to end, without the index: checks every chunk's CRC and the order of records.
+  // Reads from front to end, without the index: checks every chunk's CRC and the order of records.
   const stream = new McapStreamReader({ decompressHandlers, validateCrcs: true });
   stream.append(readFileSync(path));
   let messages = 0;

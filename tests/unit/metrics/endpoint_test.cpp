@@ -28,7 +28,7 @@ class Served {
   Served() : endpoint_(io_, {}, [this] { return "asked " + std::to_string(++asked) + "\n"; }) {
     thread_ = std::thread([this] { io_.run(); });
   }
-  /// The loop must run out of work by itself.
+  /// The event loop must run out of work by itself.
   ~Served() {
     boost::asio::post(io_, [this] { endpoint_.stop(); });
     thread_.join();
@@ -100,7 +100,7 @@ TEST(MetricsEndpoint, HoldsFewConnectionsOfTheSilent) {
   for (int i = 0; i < 8; ++i) silent.push_back(served.connect());
   EXPECT_EQ(Served::rest(served.connect()), "");  // the ninth, at once
   silent.pop_back();
-  // Sooner or later the daemon has seen that one left.
+  // The daemon notices after a while that one client left.
   std::string answer;
   while (answer.empty()) answer = served.ask("GET /metrics HTTP/1.1\r\nHost: x\r\n\r\n");
   EXPECT_THAT(answer, EndsWith("asked 1\n"));

@@ -1,4 +1,4 @@
-// The store stopped before each of its system calls in turn, as a power cut would stop it.
+// The store is stopped before each of its system calls in turn, like a power cut.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/ptrace.h>
@@ -34,7 +34,7 @@ std::optional<bool> run_until(int n, const std::function<void()>& work) {
   int status = 0;
   ::waitpid(child, &status, 0);
   if (!WIFSTOPPED(status)) return std::nullopt;
-  // The child stops when it enters a call and when it leaves it; the first is raise()'s return.
+  // The child stops when it enters and when it leaves a call; the first stop is raise()'s return.
   for (int stop = 0; stop < 2 * n; ++stop) {
     ::ptrace(PTRACE_SYSCALL, child, nullptr, nullptr);
     ::waitpid(child, &status, 0);
@@ -50,12 +50,12 @@ class Crash : public testing::Test {
   Crash() {
     fs::create_directory(start_);
     FolderCalibrationStore store(start_, {});
-    // One more, and the oldest has to go.
+    // With one more, the oldest is removed.
     for (std::size_t i = 0; i < FolderCalibrationStore::kKept; ++i) store.keep(whole("old"));
     store.make_current(3);
   }
 
-  /// Stops `work` everywhere, each time on the same state, and checks what is left.
+  /// Stops `work` before each call, each time from the same state, and checks the result.
   void stop_everywhere(const std::function<void(FolderCalibrationStore&)>& work,
                        std::uint64_t before, std::uint64_t after) {
     bool was_before = false;
@@ -85,7 +85,7 @@ class Crash : public testing::Test {
   fs::path state_ = folder_.path() / "state";
 
  private:
-  /// The current one, after all that a store has to hold was checked.
+  /// Checks the whole store and returns the number of the current calibration.
   std::uint64_t check(int n) {
     FolderCalibrationStore store(state_, {});
     std::uint64_t current = 0;
@@ -95,7 +95,7 @@ class Crash : public testing::Test {
       if (stored.current) current = stored.number;
     }
     EXPECT_EQ(store.read({}).number, current);
-    // The next upload finds its way, under a number that none has.
+    // The next upload works, under a new number.
     store.keep(whole("next"));
     EXPECT_EQ(store.read({}).number, all.back().number + 1) << "stopped before call " << n;
     const auto entries = std::distance(fs::directory_iterator(state_ / "calibrations"), {});

@@ -25,7 +25,7 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
 
-/// A calibration that can be read.
+/// Numbers of the calibrations that can be read.
 std::vector<std::uint64_t> numbers(const std::vector<StoredCalibration>& all) {
   std::vector<std::uint64_t> found;
   for (const auto& stored : all) found.push_back(stored.number);
@@ -44,7 +44,7 @@ std::uint64_t current_of(const std::vector<StoredCalibration>& all) {
 
 class Store : public testing::Test {
  protected:
-  /// A folder of the configuration's.
+  /// Makes a folder like one of the configuration.
   fs::path make_configured() {
     calibration::save(calibration::sample(), folder_.path() / "factory");
     return folder_.path() / "factory";
@@ -111,7 +111,7 @@ TEST_F(Store, IsOnTheDiskBeforeItIsConfirmed) {
 }
 
 TEST_F(Store, ListsWhatEachIs) {
-  // A trailing slash is the user's habit.
+  // Users add a trailing slash.
   FolderCalibrationStore store(state_, make_configured() / "");
   store.keep(whole("ball"));
   // date -u -d 2026-01-31T12:00:00Z +%s
@@ -127,7 +127,7 @@ TEST_F(Store, ListsWhatEachIs) {
   EXPECT_EQ(all[1].uploaded, "2026-01-31T12:00:00Z");
   EXPECT_TRUE(all[1].current);
   ASSERT_TRUE(all[1].summary.has_value()) << all[1].damage;
-  // From tests/unit/calibration/sample.hpp: 6x5 pixels of 12x9, entries -1 … 2 of the list.
+  // tests/unit/calibration/sample.hpp has 6x5 pixels of 12x9 and entries -1 … 2 of the LUT.
   EXPECT_EQ(*all[1].summary,
             (CalibrationSummary{
                 "ball", "lut", 0.051, 6, 5, -0.01, 0.02, "2026-01-31T12:00:00Z", 12, 9, {1, 2}}));
@@ -170,11 +170,11 @@ TEST_F(Store, KeepsTheNewestTwentyAndTheCurrentAndTheOneBeforeIt) {
   for (int i = 1; i <= 20; ++i) store.keep({"ball", std::to_string(i), "p"});
   EXPECT_EQ(numbers(store.list()).size(), 20U);
   store.make_current(1);
-  store.keep({"ball", "21", "p"});  // 1 was current before: it stays
+  store.keep({"ball", "21", "p"});  // 1 was current before: it is kept
   EXPECT_TRUE(fs::exists(numbered(1)));
   EXPECT_EQ(numbers(store.list()).size(), 21U);
   store.make_current(2);
-  store.keep({"ball", "22", "p"});  // … until something else was
+  store.keep({"ball", "22", "p"});  // … until another one was
   const auto all = numbers(store.list());
   EXPECT_EQ(all.size(), 21U);
   EXPECT_EQ(all.front(), 2U);
@@ -223,7 +223,7 @@ class Opened {
   explicit Opened(const fs::path& folder) : fd_(::inotify_init1(IN_CLOEXEC | IN_NONBLOCK)) {
     EXPECT_GE(::inotify_add_watch(fd_.get(), folder.c_str(), IN_OPEN), 0) << folder;
   }
-  /// Since the last time, folders left out.
+  /// Number since the last call, without folders.
   [[nodiscard]] int files() const {
     int count = 0;
     alignas(inotify_event) std::array<char, 4096> events{};
@@ -241,7 +241,7 @@ class Opened {
   base::UniqueFd fd_;
 };
 
-// Whoever asks for the list again and again must not keep the processor from the frames.
+// Repeated requests for the list must not keep the processor from the frames.
 TEST_F(Store, ReadsForTheListWhatHasChanged) {
   const fs::path configured = make_configured();
   FolderCalibrationStore store(state_, configured);
@@ -259,7 +259,7 @@ TEST_F(Store, ReadsForTheListWhatHasChanged) {
   EXPECT_EQ(second[0].summary, first[0].summary);
   EXPECT_EQ(second[1].summary, first[1].summary);
 
-  // In place, of the same size and with the time set back: a program cannot hide that.
+  // A program cannot hide a change in place of the same size with the time set back.
   const auto time = fs::last_write_time(toml);
   std::string text = base::read_file(toml);
   text.replace(text.find("version = 1"), 11, "version = 9");
@@ -268,7 +268,7 @@ TEST_F(Store, ReadsForTheListWhatHasChanged) {
   (void)uploaded.files();
   EXPECT_THAT(store.list()[1].damage, HasSubstr("version"));
   EXPECT_GT(uploaded.files(), 0);
-  // One that is damaged is looked at each time.
+  // A damaged one is read each time.
   EXPECT_THAT(store.list()[1].damage, HasSubstr("version"));
   EXPECT_GT(uploaded.files(), 0);
   EXPECT_EQ(factory.files(), 0);
@@ -281,7 +281,7 @@ TEST_F(Store, RefusesToLoadADamagedOne) {
   base::write_file_atomically(numbered(1) / "ball/calibration.toml", "version = 1\n");
   EXPECT_THROW((void)store.load(1), std::runtime_error);
   EXPECT_EQ(current_of(store.list()), 2U);
-  EXPECT_EQ(store.read(1).toml, "version = 1\n");  // its files can be looked at
+  EXPECT_EQ(store.read(1).toml, "version = 1\n");  // its files can be read
 }
 
 TEST_F(Store, PassesOverWhatIsNotItsOwn) {
@@ -299,7 +299,7 @@ TEST_F(Store, PassesOverWhatIsNotItsOwn) {
 TEST_F(Store, SaysThatTheLinkLeadsElsewhere) {
   FolderCalibrationStore store(state_, {});
   fs::create_directory_symlink(make_configured(), state_ / "calibration");
-  EXPECT_EQ(store.current(), folder_.path() / "factory");  // an administrator's own doing
+  EXPECT_EQ(store.current(), folder_.path() / "factory");  // set by an administrator
   EXPECT_EQ(store.current_number(), std::nullopt);
   EXPECT_THROW((void)store.read({}), std::runtime_error);
 }

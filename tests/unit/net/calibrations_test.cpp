@@ -1,4 +1,4 @@
-// What clients may ask of the daemon's calibrations.
+// Requests about the daemon's calibrations.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -49,14 +49,14 @@ v1::ClientMessage activate(std::uint64_t number) {
   return message;
 }
 
-/// The pipeline says that it uses a calibration.
+/// Lets the pipeline report that it uses a calibration.
 void be_calibrated(Rig& rig) {
   pipeline::Status status;
   status.calibration = std::make_shared<calibration::Calibration>();
   rig.port.set_status(status);
 }
 
-/// The one marked current; 999 when none is.
+/// Number of the calibration marked current; 999 when none is.
 std::uint64_t current_of(RawClient& client) {
   const auto reply = client.request(list());
   for (const auto& stored : reply.calibrations().calibrations()) {
@@ -65,7 +65,7 @@ std::uint64_t current_of(RawClient& client) {
   return 999;
 }
 
-/// The one marked in use; 999 when none is.
+/// Number of the calibration marked in use; 999 when none is.
 std::uint64_t in_use(RawClient& client) {
   const auto reply = client.request(list());
   for (const auto& stored : reply.calibrations().calibrations()) {
@@ -105,7 +105,7 @@ TEST(Upload, NamesWhatIsWrong) {
   expect_invalid(client, upload("..", "good"), "upload_calibration.name");
   expect_invalid(client, upload("a.b", "good"), "upload_calibration.name");
   expect_invalid(client, upload(std::string(65, 'x'), "good"), "upload_calibration.name");
-  // Its first 64 bytes end within a character.
+  // Byte 64 is within a character.
   std::string accents = "a";
   for (int i = 0; i < 40; ++i) accents += "\xc3\xa9";
   expect_invalid(client, upload(accents, "good"), "\xc3\xa9\"; allowed are 1 to 64 letters");
@@ -171,7 +171,7 @@ TEST(GetCalibration, TakesANumber) {
   EXPECT_EQ(client.request(get_calibration()).calibration().number(), 1U);
 }
 
-// At most 16 may wait, which says nothing of those that have been answered.
+// At most 16 may wait; answered ones don't count.
 TEST(GetCalibration, OneAfterAnotherAreNeverTooMany) {
   Rig rig;
   RawClient client(rig.tcp_port());
@@ -287,7 +287,7 @@ TEST(ActivateCalibration, WaitsForAnotherChange) {
   EXPECT_EQ(client.reply().id(), 50U);
 }
 
-// Preparing takes up to a second: were it done on the network thread, all streams would stop.
+// Preparing takes up to a second; on the network thread it would stop all streams.
 TEST(ActivateCalibration, OthersAreServedWhileItIsPrepared) {
   Rig rig({}, answer_done);
   rig.port.set_slow(true);

@@ -109,7 +109,7 @@ TEST(ClientLibrary, StreamsEveryEncoding) {
     EXPECT_TRUE(std::isnan(mm[3]));
     ASSERT_TRUE(frame.has_luma());
     EXPECT_THAT(client::pixels_of(frame.luma()), Each(1500 % 256));
-    // Damaged maps and encodings of a newer daemon.
+    // Damaged maps, and encodings of a newer daemon.
     frame.mutable_luma()->mutable_data()->pop_back();
     EXPECT_THROW((void)client::pixels_of(frame.luma()), client::ProtocolError);
     frame.mutable_depth()->mutable_data()->pop_back();
@@ -126,7 +126,7 @@ TEST(ClientLibrary, WaitsForTheNextAndGivesUp) {
   EXPECT_FALSE(client.next(std::chrono::milliseconds(0)).has_value());
 }
 
-// A terminal that is resized, for one.
+// A resized terminal sends a signal, for example.
 TEST(ClientLibrary, ASignalDoesNotEndAWait) {
   Rig rig;
   Client client(options(rig));
@@ -208,7 +208,7 @@ TEST(ClientLibrary, ListsReadsAndActivatesCalibrations) {
   EXPECT_EQ(all[1].name(), "first");
   EXPECT_EQ(all[1].uploaded(), "2026-01-31T12:00:00Z");
   EXPECT_TRUE(all[1].current());
-  EXPECT_FALSE(all[1].in_use());  // the pipeline has none
+  EXPECT_FALSE(all[1].in_use());  // the pipeline uses none
   ASSERT_TRUE(all[1].has_summary());
   EXPECT_EQ(all[1].summary().mm_per_px(), 0.0414);
   EXPECT_EQ(all[1].summary().frame_width(), 800U);
@@ -273,14 +273,14 @@ TEST(ClientLibrary, SaysTheReasonThatCameBeforeAReset) {
   daemon.finish();
   try {
     (void)client.status();
-    FAIL() << "an answer from nobody";
+    FAIL() << "no daemon could answer";
   } catch (const client::ConnectionError& e) {
     EXPECT_STREQ(e.what(), "too many answers lay unread");
   }
 }
 
 TEST(ClientLibrary, GivesUpOnAnAnswerThoughFramesCome) {
-  // So many at once that the next always lies ready: sending them is faster than reading them.
+  // A large batch, so that the next frame is always there: sending is faster than reading.
   PlayedDaemon daemon({[](Peer& peer) {
     peer.greet();
     v1::ServerMessage frame;

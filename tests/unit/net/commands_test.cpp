@@ -1,4 +1,4 @@
-// What clients may ask, and how they are answered; SetLight has a file of its own.
+// Requests of clients and their answers; SetLight has a file of its own.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-// A client that stops reading is kept, one that is gone is not.
+// A client that stops reading is kept; a dead one is dropped.
 #include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -27,7 +27,7 @@ using Clock = PeerJudge::Clock;
 constexpr int kSmallBuffer = 4096;
 constexpr milliseconds kDeadAfter{3000};
 
-/// The judge of a connection that is as old as `Clock`, with thirty seconds.
+/// The judge of a connection that is as old as `Clock`, with a limit of thirty seconds.
 class Judged : public ::testing::Test {
  protected:
   bool alive(seconds now, TcpProgress progress) {
@@ -45,7 +45,7 @@ TEST_F(Judged, IsAliveWhileItTakesWhatItIsSent) {
 
 TEST_F(Judged, IsAliveThoughItHasSaidNothingForHours) {
   EXPECT_TRUE(alive(seconds(7200), {false, 5, seconds(7200)}));
-  // Then something is sent, and the look comes before the answer.
+  // Now something is sent, and the check comes before the answer.
   EXPECT_TRUE(alive(seconds(7202), {true, 5, seconds(7202)}));
 }
 
@@ -53,7 +53,7 @@ TEST_F(Judged, IsAliveWhileItAnswersProbesAndTakesNothing) {
   EXPECT_TRUE(alive(seconds(0), {false, 5, seconds(0)}));
   for (int s = 2; s < 3600; s += 2) {
     ASSERT_TRUE(alive(seconds(s), {true, 5, seconds(s % 22)})) << s;
-    // Ever later, so that the kernel never comes so far.
+    // The timeout grows, so that the kernel never reaches it.
     ASSERT_EQ(judge_.user_timeout(), seconds(s) + milliseconds(11'250));
   }
 }
@@ -74,13 +74,13 @@ void publish_for(Rig& rig, milliseconds time, std::uint64_t& sequence) {
   const auto end = Clock::now() + time;
   while (Clock::now() < end) {
     rig.port.publish(make_frame(++sequence, 800, 600));
-    // One that a busy machine lets another take the place of is no frame that the reader missed.
+    // A frame that the next one replaces on a busy machine is not missed by the reader.
     EXPECT_TRUE(rig.port.wait_fetched());
     std::this_thread::sleep_for(milliseconds(20));
   }
 }
 
-/// Frames made since the start; once answered, what was being sent to `asking` has gone.
+/// Number of frames encoded since the start; the reply to `asking` follows all frames before it.
 std::uint64_t encoded(RawClient& asking) {
   v1::ClientMessage message;
   message.mutable_get_status();
@@ -88,7 +88,7 @@ std::uint64_t encoded(RawClient& asking) {
 }
 
 // NOLINTBEGIN(misc-const-correctness): clang-tidy 19 takes clients that send for constants
-// To the kernel a program that was stopped is one that does not read.
+// The kernel cannot tell a stopped program from one that does not read.
 TEST(StoppedReader, IsKeptAndReportedWhatItMissed) {
   NetConfig config;
   config.peer_timeout = kDeadAfter;
@@ -103,14 +103,14 @@ TEST(StoppedReader, IsKeptAndReportedWhatItMissed) {
   EXPECT_THAT(rig.log(), Not(HasSubstr("disconnected")));
   EXPECT_EQ(stopped.frame().sequence(), 1U);
   EXPECT_GT(encoded(stopped), 60U);
-  // What waited while it was stopped is old, and is not sent.
+  // Frames that waited while it was stopped are old, and are not sent.
   rig.port.publish(make_frame(++sequence, 800, 600));
   const auto frame = stopped.frame();
   EXPECT_EQ(frame.sequence(), sequence);
   EXPECT_EQ(frame.dropped(), sequence - 2);
 }
 
-// The second frame waits, the next 60 take each other's place, and then none is made any more.
+// The second frame waits, the next 60 replace each other, and then encoding stops.
 TEST(StoppedReader, IsNotMadeFramesForUntilItReadsOn) {
   Rig rig;
   RawClient asking(rig.tcp_port());
@@ -162,7 +162,7 @@ TEST(StoppedReader, IsOwedNothingOfASubscriptionThatItHasLeft) {
   EXPECT_FALSE(next.has_jpeg());
 }
 
-/// The thread gets a network of its own, in which only loopback is up, and goes back at the end.
+/// The thread gets its own network namespace with only loopback, and returns at the end.
 class OwnNetwork {
  public:
   OwnNetwork() : before_(::open("/proc/thread-self/ns/net", O_RDONLY | O_CLOEXEC)) {
@@ -178,7 +178,7 @@ class OwnNetwork {
   OwnNetwork& operator=(const OwnNetwork&) = delete;
 
   [[nodiscard]] bool made() const { return made_; }
-  /// Not up: whatever is sent vanishes, and nobody says so.
+  /// Down: data is dropped without an error.
   void up(bool on) const {
     ifreq request{};
     std::strcpy(request.ifr_name, "lo");

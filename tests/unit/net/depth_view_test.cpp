@@ -10,7 +10,7 @@
 
 #include "daemon/recon/model.hpp"
 
-// ASSERT_TRUE is a check that clang-tidy does not follow.
+// clang-tidy does not recognise ASSERT_TRUE as a check.
 // NOLINTBEGIN(bugprone-unchecked-optional-access)
 namespace dtact::net {
 namespace {
@@ -147,7 +147,7 @@ TEST(DepthView, CutsARegionAtTheBorder) {
 TEST(DepthView, GrowsARegionToWholeBlocks) {
   DepthViewer viewer;
   const auto frame = counting(16, 8);
-  // Columns 5 … 9 touch the blocks of 4 from 4 to 11, row 3 the block from 0 to 3.
+  // Columns 5 … 9 reach into the blocks of 4 from 4 to 11, row 3 into the block from 0 to 3.
   const auto view = viewer.view(frame, {.decimation = 4, .region = DepthRegion{5, 3, 5, 1}});
   ASSERT_TRUE(view);
   EXPECT_EQ(view->x, 1);
@@ -177,7 +177,7 @@ TEST(DepthView, ACoarseFrameIsSentAsItIs) {
   auto frame = counting(4, 3);
   frame.decimation = 4;
   DepthViewer viewer;
-  // Of the full resolution's columns 5 … 9 the frame's 1 and 2, of row 8 the frame's 2.
+  // Columns 5 … 9 at full resolution are columns 1 and 2 of the frame; row 8 is its row 2.
   const auto view = viewer.view(frame, {.decimation = 1, .region = DepthRegion{5, 8, 5, 1}});
   ASSERT_TRUE(view);
   EXPECT_THAT(view->values, ElementsAre(9, 10));
@@ -214,7 +214,7 @@ TEST(DepthView, RefusesOtherSpecs) {
   EXPECT_THROW((void)viewer.view(frame, {.um_per_unit = 4}), std::invalid_argument);
 }
 
-/// The definition, pixel by pixel in double precision.
+/// The definition, computed pixel by pixel in double precision.
 std::vector<std::int16_t> naive(const pipeline::DepthFrame& frame, int factor, int um,
                                 const DepthView& view) {
   const int left = frame.width % factor / 2;
@@ -247,7 +247,7 @@ TEST(DepthView, IsTheDefinitionOnArbitraryMaps) {
   for (int round = 0; round < 300; ++round) {
     auto frame = frame_of(1 + below(70), 1 + below(30), {});
     const int reach = round % 3 == 0 ? 65535 : 60;
-    const int untrusted = below(4);  // tenths of all
+    const int untrusted = below(4);  // tenths of the pixels
     for (int i = 0; i < frame.width * frame.height; ++i) {
       frame.depth_um.push_back(
           below(10) < untrusted ? kNo : static_cast<std::int16_t>(below(reach) - reach / 2));

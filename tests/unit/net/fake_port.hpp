@@ -20,10 +20,10 @@
 
 namespace dtact::net::test {
 
-/// Longer than anything takes on the slowest machine; a wait that reaches it has failed.
+/// Longer than any step on the slowest machine; a wait that reaches it has failed.
 inline constexpr std::chrono::seconds kTimeout{60};
 
-/// A pipeline that a test plays. The network thread sees the Port, the test the rest.
+/// A pipeline that a test plays. The network thread uses the Port, the test the rest.
 class FakePort : public pipeline::Port {
  public:
   // The Port.
@@ -98,17 +98,17 @@ class FakePort : public pipeline::Port {
     }
     ring();
   }
-  /// How commands are answered at once; without, not at all. Before the server runs.
+  /// Sets how commands are answered at once; without it, not at all. Call before the server runs.
   void answer(std::function<std::optional<pipeline::CommandDone>(const pipeline::Command&)> f) {
     answer_ = std::move(f);
   }
-  /// Nothing is prepared until it is false again.
+  /// While true, nothing is prepared.
   void set_slow(bool slow) {
     const std::lock_guard lock(mutex_);
     slow_ = slow;
     changed_.notify_all();
   }
-  /// Why nothing can be prepared. Before the server runs.
+  /// Sets the reason why nothing can be prepared. Call before the server runs.
   void set_unfit(const std::string& why) { unfit_ = why; }
   void set_full(bool full) {
     const std::lock_guard lock(mutex_);
@@ -118,7 +118,7 @@ class FakePort : public pipeline::Port {
     const std::lock_guard lock(mutex_);
     status_ = std::move(status);
   }
-  /// False when it does not happen within kPatience.
+  /// False when it does not happen within kTimeout.
   [[nodiscard]] bool wait_fetched() {
     return wait([this] { return !fresh_.has_value(); });
   }
@@ -146,9 +146,9 @@ class FakePort : public pipeline::Port {
     (void)!::write(fd_.get(), &one, sizeof one);
   }
   template <typename Condition>
-  bool wait(Condition flag) {
+  bool wait(Condition condition) {
     std::unique_lock lock(mutex_);
-    return changed_.wait_for(lock, kTimeout, flag);
+    return changed_.wait_for(lock, kTimeout, condition);
   }
 
   base::UniqueFd fd_{::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)};

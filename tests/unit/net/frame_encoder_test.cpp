@@ -136,7 +136,7 @@ TEST(FrameEncoder, RefusesWhatExceedsTheWire) {
   EXPECT_NE(encoder.encode(kind(2, 0)), nullptr);  // flat, so it compresses
 }
 
-// The cap is 16 MiB; what stands round a body takes 5 bytes before and 11 after it at most.
+// The cap is 16 MiB; the envelope takes at most 5 bytes before a body and 11 after it.
 TEST(FrameEncoder, LeavesRoomForTheEnvelope) {
   FrameEncoder encoder("f");
   pipeline::DepthFrame frame;
@@ -160,7 +160,7 @@ TEST(FrameEncoder, LeavesRoomForTheEnvelope) {
   }
 }
 
-/// The field numbers of a message, in the order in which they come.
+/// The field numbers of a message, in their order on the wire.
 std::vector<int> fields_of(const std::string& bytes) {
   google::protobuf::io::CodedInputStream in(reinterpret_cast<const std::uint8_t*>(bytes.data()),
                                             static_cast<int>(bytes.size()));

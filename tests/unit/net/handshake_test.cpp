@@ -58,15 +58,15 @@ TEST(Handshake, RefusesAnotherMajorVersionAndEnds) {
   EXPECT_TRUE(client.ends());
 }
 
-// After its Hello, so that nothing but the end itself limits how long it may stay.
-TEST(Handshake, LetsGoOfARefusedClientThatStays) {
+// It has said Hello, so only the server's end of the connection limits how long it stays.
+TEST(Handshake, DropsARefusedClientThatStays) {
   const Rig rig;
   RawClient client(rig.tcp_port());
   client.hello();
   client.send_bytes("\0\0\0\3\xff\xff\xff"s);
   EXPECT_EQ(client.reply().error().code(), v1::ERROR_BAD_MESSAGE);
   EXPECT_TRUE(client.ends());
-  EXPECT_TRUE(client.is_let_go());
+  EXPECT_TRUE(client.is_dropped());
 }
 
 TEST(Handshake, WantsHelloFirst) {
@@ -117,7 +117,7 @@ TEST(Handshake, KeepsSilentClientsAfterHello) {
   const Rig rig(config);
   RawClient client(rig.tcp_port());
   client.hello();
-  // One that came later and never greeted is let go; by then the time of the first is over, too.
+  // A later client without Hello is dropped; the first one's time is over by then, too.
   RawClient silent(rig.tcp_port());
   EXPECT_TRUE(silent.ends());
   v1::ClientMessage message;
@@ -244,7 +244,7 @@ TEST(Server, AcceptsAgainOnceThereAreDescriptors) {
   EXPECT_NO_THROW(client.hello());
 }
 
-// The side that ends a connection keeps its port for a minute.
+// The side that closes a connection keeps its port for a minute.
 TEST(Server, StartsAgainThoughItEndedConnections) {
   auto rig = std::make_unique<Rig>();
   NetConfig config;

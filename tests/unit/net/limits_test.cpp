@@ -1,4 +1,4 @@
-// What clients may take of the daemon, and what it does with those that want more.
+// What clients may use of the daemon, and how it treats those that want more.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <poll.h>
@@ -26,7 +26,7 @@ using testing::HasSubstr;
 using namespace std::string_literals;
 using std::chrono::milliseconds;
 
-/// A connection from another address of this machine than 127.0.0.1, all of which reach it.
+/// A connection from an address of this machine other than 127.0.0.1.
 base::UniqueFd connected_from(const char* from, std::uint16_t port) {
   base::UniqueFd fd(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0));
   sockaddr_in address{};
@@ -56,7 +56,7 @@ TEST(LimitedLog, SaysHowManyLinesItLeftOut) {
   std::vector<std::string> lines;
   const Log log = limited([&lines](const LogLine& line) { lines.push_back(line.text); });
   for (int i = 0; i < 5000; ++i) log({LogLevel::info, "x"});
-  // 100, and those whose time came meanwhile; the last ones that were left out are not told yet.
+  // 100, and as many as became allowed meanwhile. The count of the last dropped lines is still due.
   EXPECT_GE(lines.size(), 100U);
   EXPECT_LT(lines.size(), 5000U);
   EXPECT_EQ(lines.front(), "x");
@@ -84,7 +84,7 @@ TEST(BeforeHello, AFloodLeavesRoomForOthers) {
   for (std::size_t i = 0; i < 3 * SessionList::kMaxUnauthenticated; ++i) {
     flood.push_back(std::make_unique<RawClient>(rig.tcp_port()));
   }
-  // One who came before, from elsewhere, has kept its place.
+  // An earlier client from another address keeps its connection.
   EXPECT_NO_THROW(early.hello());
   RawClient late(rig.tcp_port());
   EXPECT_NO_THROW(late.hello());
@@ -165,7 +165,7 @@ TEST(Requests, ALargeOneCountsAsMany) {
   EXPECT_EQ(client.request(message).error().code(), v1::ERROR_FLOOD);
 }
 
-/// What becomes of the largest messages, parsed or not.
+/// The answer to the largest messages, parsed or not.
 TEST(Incoming, OnlyAPlainUploadMayBeLarge) {
   const std::string png(100'000, 'x');
   v1::ClientMessage upload;
@@ -175,7 +175,7 @@ TEST(Incoming, OnlyAPlainUploadMayBeLarge) {
   const std::string whole = upload.SerializeAsString();
   EXPECT_TRUE(is_plain_upload(whole));
   EXPECT_FALSE(is_plain_upload(whole.substr(0, whole.size() - 1)));
-  // Fields of later versions: few of them.
+  // Only few fields of later versions are allowed.
   const std::string unknown = "\xf8\x01\x01"s;
   const auto times = [](int n, const std::string& text) {
     std::string all;
@@ -191,7 +191,7 @@ TEST(Incoming, OnlyAPlainUploadMayBeLarge) {
   for (int i = 0; i < 40'000; ++i) leds.mutable_set_light()->add_leds();
   EXPECT_FALSE(is_plain_upload(leds.SerializeAsString()));
   EXPECT_FALSE(is_plain_upload(whole + leds.SerializeAsString()));
-  // Inside of the upload, too.
+  // The same within the upload.
   std::string inside = upload.upload_calibration().SerializeAsString() + times(20, unknown);
   const std::size_t size = inside.size();
   inside = "\x42"s + static_cast<char>((size & 0x7fU) | 0x80U) +
@@ -224,7 +224,7 @@ TEST(Incoming, IsBoundedForAllClientsTogether) {
     clients.back()->hello();
     clients.back()->send_bytes(part);
   }
-  // Whose bytes are read last nobody knows.
+  // Any of the three may be read last.
   std::vector<pollfd> polled;
   for (const auto& client : clients) polled.push_back({client->descriptor(), POLLIN, 0});
   ASSERT_EQ(::poll(polled.data(), polled.size(), 60'000), 1);
@@ -235,7 +235,7 @@ TEST(Incoming, IsBoundedForAllClientsTogether) {
   EXPECT_EQ(reply.error().code(), v1::ERROR_FLOOD);
   EXPECT_THAT(reply.error().message(), HasSubstr("33554432 bytes"));
   EXPECT_TRUE(clients.back()->ends());
-  // Once a message is through its room is another's.
+  // Once a message is complete its room is free again.
   clients[0]->send_bytes("x");
   EXPECT_EQ(clients[0]->reply().error().code(), v1::ERROR_TOO_LARGE);
   RawClient next(rig.tcp_port());
@@ -245,7 +245,7 @@ TEST(Incoming, IsBoundedForAllClientsTogether) {
   EXPECT_EQ(next.reply().error().code(), v1::ERROR_TOO_LARGE);
 }
 
-// Two of them would be all the room there is.
+// Two of them would take all the room.
 TEST(Incoming, ABrokenOffUploadGivesItsRoomBack) {
   Rig rig;
   const std::string part = "\1\0\0\0"s + std::string((16U << 20U) - 1, 'x');
@@ -265,7 +265,7 @@ TEST(Incoming, ABrokenOffUploadGivesItsRoomBack) {
   next.hello();
   next.send_bytes(part);
   next.send_bytes("x");
-  // Read to its end, and then found to be no upload.
+  // It is read to its end and then found not to be an upload.
   EXPECT_EQ(next.reply().error().code(), v1::ERROR_TOO_LARGE);
 }
 

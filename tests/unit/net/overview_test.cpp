@@ -1,4 +1,4 @@
-// What the daemon counts over all clients.
+// The daemon's counts over all clients.
 #include <gtest/gtest.h>
 
 #include <chrono>
@@ -32,7 +32,7 @@ TEST(Overview, CountsClientsThatLeftToo) {
     EXPECT_GT(now.traffic.bytes, 0U);
   }
   ASSERT_TRUE(rig.wait_log("disconnected"));
-  // Each connection is counted as gone a moment after it ended.
+  // A connection counts as gone a moment after it ended.
   Overview later = rig.overview();
   for (int i = 0; i < 2000 && (later.traffic.refused == 0 || later.traffic.frames == 0); ++i) {
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
@@ -70,7 +70,7 @@ TEST(Overview, KnowsWhenTheReferenceWasTaken) {
   (void)client.event();
   EXPECT_TRUE(rig.overview().reference_taken_ns.has_value());
   rig.port.emit(
-      pipeline::ReferenceTaken{.restored = true});  // of an earlier run: how old, nobody knows
+      pipeline::ReferenceTaken{.restored = true});  // of an earlier run: its age is unknown
   (void)client.event();
   EXPECT_FALSE(rig.overview().reference_taken_ns.has_value());
 }

@@ -22,7 +22,7 @@ namespace dtact::net::test {
 /// A client that sends and reads exactly what a test says, right or wrong.
 class RawClient {
  public:
-  /// `receive_buffer`: bytes the kernel keeps for us; 0 = its default.
+  /// `receive_buffer`: size of the kernel's receive buffer in bytes; 0 = its default.
   explicit RawClient(std::uint16_t port, int receive_buffer = 0)
       : fd_(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
     if (receive_buffer > 0) {
@@ -36,7 +36,7 @@ class RawClient {
       throw std::runtime_error("cannot connect");
     }
   }
-  /// Over a socket that is connected.
+  /// A client on a connected socket.
   explicit RawClient(base::UniqueFd connected) : fd_(std::move(connected)) {}
 
   void send_bytes(std::string_view bytes) {
@@ -69,7 +69,7 @@ class RawClient {
     if (!message.ParseFromString(decoder_.message())) throw std::runtime_error("no ServerMessage");
     return message;
   }
-  /// The next reply; frames and events before it are passed over.
+  /// The next reply; skips frames and events before it.
   v1::Reply reply() {
     for (;;) {
       auto message = receive();
@@ -91,15 +91,15 @@ class RawClient {
       if (message->has_event()) return message->event();
     }
   }
-  /// The connection ends, after whatever comes before.
+  /// Whether the connection ends, after any messages.
   bool ends() {
     while (receive().has_value()) {
     }
     return true;
   }
 
-  /// The other side closes its end altogether: what is sent comes back as a reset. Waits 20 s.
-  bool is_let_go() {
+  /// Whether the other side closes completely, so that data sent to it is reset. Waits 20 s.
+  bool is_dropped() {
     for (int i = 0; i < 400; ++i) {
       if (::send(fd_.get(), "x", 1, MSG_NOSIGNAL) < 0) return true;
       ::poll(nullptr, 0, 50);
@@ -131,9 +131,9 @@ class RawClient {
     message.mutable_subscribe()->set_summary(summary);
     if (!request(message).has_done()) throw std::runtime_error("not subscribed");
   }
-  /// Sends nothing more; the other side sees the end after all that was sent.
+  /// Sends nothing more; the other side sees the end after all data.
   void finish() { ::shutdown(fd_.get(), SHUT_WR); }
-  /// Dies without a word: the other side gets a reset.
+  /// Closes without an answer: the other side gets a reset.
   void die() {
     const linger now{1, 0};
     ::setsockopt(fd_.get(), SOL_SOCKET, SO_LINGER, &now, sizeof now);

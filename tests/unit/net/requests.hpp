@@ -29,7 +29,7 @@ inline v1::ClientMessage brightness(std::uint32_t value) {
   return message;
 }
 
-/// Expects the request to be refused as invalid with a sentence that has `part` in it.
+/// Expects the request to be refused as invalid, with a message that contains `part`.
 inline void expect_invalid(RawClient& client, const v1::ClientMessage& message,
                            const std::string& part) {
   const auto reply = client.request(message);

@@ -18,7 +18,7 @@
 namespace dtact::net::test {
 
 /// A store in memory with a configured calibration, "factory", and three others of which "first" is
-/// current. The text "bad" is no calibration, and one of "unwritable" cannot be made current.
+/// current. The text "bad" is not a calibration; making the one with "unwritable" current fails.
 class FakeStore : public CalibrationStore {
  public:
   std::shared_ptr<const calibration::Calibration> check(const CalibrationFiles& files) override {
@@ -110,7 +110,7 @@ class Rig {
     const std::lock_guard lock(mutex_);
     return log_;
   }
-  /// Waits until the log says so.
+  /// Waits until the log contains `text`.
   [[nodiscard]] bool wait_log(const std::string& text) {
     const auto end = std::chrono::steady_clock::now() + kTimeout;
     while (log().find(text) == std::string::npos) {

@@ -1,4 +1,4 @@
-// Who may do what: tokens, addresses beyond this machine, and what status says of it.
+// Rights of clients: tokens, addresses beyond this machine, and what status reports of it.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -80,7 +80,7 @@ TEST_F(Guarded, ServesOthersWhileOneWaitsForItsRefusal) {
     m.mutable_hello()->set_major(1);
   });
   wrong.send(hello);
-  // What it sends behind is not looked at: not even as a second guess.
+  // The message behind it is not read, not even as a second attempt.
   hello.set_id(2);
   hello.mutable_hello()->set_token(kControl);
   wrong.send(hello);
@@ -153,7 +153,7 @@ TEST(Security, ReportsWhereAnybodyMayCome) {
 }
 // NOLINTEND(misc-const-correctness)
 
-/// What the settings are refused with; empty when they are not.
+/// The refusal of the settings; empty when they are accepted.
 std::string refusal(const NetConfig& config) {
   try {
     check_security(config);

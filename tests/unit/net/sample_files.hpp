@@ -8,7 +8,7 @@
 
 namespace dtact::net {
 
-/// A whole calibration of that name, as a client uploads it.
+/// The files of a complete calibration with this name, as a client uploads it.
 inline CalibrationFiles whole(const std::string& name) {
   const calibration::Files files = calibration::format(calibration::sample());
   return {name, files.toml, files.reference_png};

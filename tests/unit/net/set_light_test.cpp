@@ -1,4 +1,4 @@
-// What a client sets of the light, and what is told of it.
+// Changes of the light by clients, and the events that follow.
 #include <gtest/gtest.h>
 
 #include <string>
@@ -45,7 +45,7 @@ TEST(SetLight, ChangesOnlyWhatIsSet) {
   client.hello();
   auto reply = client.request(brightness(100));
   EXPECT_EQ(reply.light().brightness(), 100U);
-  EXPECT_EQ(reply.light().leds(3).g(), 255U);  // as the ring was
+  EXPECT_EQ(reply.light().leds(3).g(), 255U);  // unchanged
   reply = client.request(scheme("scheme4"));
   EXPECT_EQ(reply.light().brightness(), 100U);
   EXPECT_EQ(reply.light().leds(0).r(), 255U);
@@ -104,7 +104,7 @@ TEST(SetLight, AnswersOnlyWhenTheRingHasBeenWritten) {
   client.send(message);
   const auto command = rig.port.wait_command(0);
   ASSERT_TRUE(command.has_value());
-  // Anything that is answered now comes before the light's answer.
+  // A reply that comes now was sent before the light's reply.
   v1::ClientMessage status;
   status.mutable_get_status();
   EXPECT_TRUE(client.request(status).has_status());
@@ -150,7 +150,7 @@ TEST(SetLight, AChangeBuildsOnTheOneThatIsStillUnderWay) {
   EXPECT_EQ(std::get<pipeline::SetLight>(second->what).light.brightness, 10);
 }
 
-// The light of the first is told while the second is still to be written.
+// The first change is reported while the second is not yet written.
 TEST(SetLight, AChangeBuildsOnTheLastOneAskedFor) {
   Rig rig;
   RawClient client(rig.tcp_port());

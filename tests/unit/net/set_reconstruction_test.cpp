@@ -1,4 +1,4 @@
-// How clients change the way depth is made, and what they are told of it.
+// Changes of the reconstruction by clients, and the events that follow.
 #include <gtest/gtest.h>
 
 #include <limits>
@@ -96,7 +96,7 @@ TEST(SetReconstruction, IsDoneOneAtATime) {
   EXPECT_EQ(other.event().reconstruction().resolution(), "half");
 }
 
-// What is prepared for the one must fit the other.
+// A reconstruction that is prepared for one calibration must not be used with the next.
 TEST(SetReconstruction, WaitsForAnotherCalibration) {
   Rig rig;
   RawClient client(rig.tcp_port());

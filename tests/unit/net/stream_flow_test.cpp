@@ -18,7 +18,7 @@ using testing::HasSubstr;
 /// Kernel buffer of a client that is to be slow. A frame of 800×600 is far larger.
 constexpr int kSmallBuffer = 16 * 1024;
 
-// The newest frame wins and the rest is counted; an answer goes before the waiting frame.
+// The newest frame wins and the others are counted; an answer goes before the waiting frame.
 TEST(Stream, AnAnswerWaitsForTheFrameBeingSentAndNoOther) {
   Rig rig;
   RawClient slow(rig.tcp_port(), kSmallBuffer);
@@ -98,7 +98,7 @@ TEST(Stream, SurvivesAClientKilledInTheMiddleOfAFrame) {
   EXPECT_EQ(other.request(get_status()).status().clients_size(), 1);
 }
 
-/// Asks for a calibration of a mebibyte.
+/// Requests a calibration of a mebibyte.
 v1::ClientMessage get_large(Rig& rig, RawClient& client) {
   v1::ClientMessage message;
   auto& upload = *message.mutable_upload_calibration();
@@ -188,7 +188,7 @@ TEST(Stream, SendsEachPartAtTheRateThatIsAskedFor) {
   EXPECT_EQ(luma, (std::vector<std::uint64_t>{0, 4, 8}));
 }
 
-// A part with a rate of its own is due once; that the frame gives way must not lose it.
+// A part with a rate of its own is due once; replacing the frame must not lose the part.
 TEST(Stream, ANewerFrameHoldsWhatWasDueOfTheOneItReplaces) {
   Rig rig;
   RawClient slow(rig.tcp_port(), kSmallBuffer);

@@ -1,4 +1,4 @@
-// What of a frame reaches a client, and which frames.
+// Which parts of which frames reach a client.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -139,7 +139,7 @@ TEST(Stream, GivesEveryNthFrame) {
   for (const std::uint64_t sequence : {1U, 4U, 7U}) {
     const auto frame = third.frame();
     EXPECT_EQ(frame.sequence(), sequence);
-    EXPECT_EQ(frame.dropped(), 0U);  // what was not asked for is not missed
+    EXPECT_EQ(frame.dropped(), 0U);  // frames that were not requested are not counted
   }
 }
 
@@ -194,7 +194,7 @@ TEST(Stream, OfEveryNthFrameOnlyThoseWantedAreMissed) {
     rig.port.publish(frame);
     ASSERT_EQ(all.frame().sequence(), sequence);
   };
-  // Of the frames 0, 1, 2, ... it is to get 0, 3, 6, 9.
+  // The client is to get the frames 0, 3, 6, 9 of 0, 1, 2, ...
   publish(0, 0);
   EXPECT_EQ(third.frame().dropped(), 0U);
   publish(3, 2);

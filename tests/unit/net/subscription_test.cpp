@@ -20,7 +20,7 @@ constexpr double kPeriodNs = 1e9 / 60;
 /// The n-th frame of a camera of 60 frames a second, some time after its machine's start.
 std::int64_t at(int frame) { return 1'000'000'000 + std::llround(frame * kPeriodNs); }
 
-/// 'x' for each of so many frames that is let through; `jitter_ns` back and forth in turn.
+/// 'x' for each of `frames` frames that passes; each is late or early by `jitter_ns` in turn.
 std::string let_through(double hz, int frames, std::int64_t jitter_ns = 0) {
   RateLimit limit(hz);
   std::string pattern;
@@ -77,7 +77,7 @@ Subscription made(const v1::Subscribe& request) {
   return std::get<Subscription>(std::move(result));
 }
 
-/// The parts of so many frames at 60 a second: d, l, j, s for each, '.' for no message.
+/// The parts of `frames` frames at 60 a second: d, l, j, s for each, '.' for no message.
 std::string parts_of(Subscription subscription, int frames) {
   std::string text;
   for (int i = 0; i < frames; ++i) {

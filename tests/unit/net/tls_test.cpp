@@ -29,7 +29,7 @@ using testing::AllOf;
 using testing::HasSubstr;
 using testing::MatchesRegex;
 
-/// A client that takes any certificate.
+/// A client that accepts any certificate.
 class TlsClient {
  public:
   explicit TlsClient(std::uint16_t port, int version = TLS1_3_VERSION)
@@ -46,7 +46,7 @@ class TlsClient {
     ASSERT_EQ(::SSL_write(ssl_.get(), bytes.data(), static_cast<int>(bytes.size())),
               static_cast<int>(bytes.size()));
   }
-  /// Nothing at an end that TLS knows of.
+  /// Nothing after an end that TLS reports.
   std::optional<v1::ServerMessage> receive() {
     while (decoder_.feed(unread_) != wire::MessageDecoder::Result::message) {
       const int n = ::SSL_read(ssl_.get(), buffer_, sizeof buffer_);
@@ -116,7 +116,7 @@ class TlsServer : public ::testing::Test {
     base::write_file_atomically(config_.tls_certificate, pair.certificate);
     base::write_file_atomically(config_.tls_key, pair.key, 0600);
   }
-  /// What the pair is refused with; empty when it is taken.
+  /// The refusal of the pair; empty when it is accepted.
   std::string refusal() {
     try {
       const Tls tls(config_.tls_certificate, config_.tls_key);

@@ -20,7 +20,7 @@ using calibration::TempFolder;
 using testing::HasSubstr;
 using testing::Not;
 
-/// What the text is refused with; empty when it is taken.
+/// The refusal of the text; empty when it is accepted.
 std::string refusal(const std::string& text) {
   try {
     const Tokens tokens(text, "/etc/tokens");

@@ -50,7 +50,7 @@ class UnixSocket : public ::testing::Test {
  protected:
   UnixSocket() { config_.unix_socket = path_; }
 
-  /// What a server with these settings is refused with.
+  /// The refusal of a server with these settings.
   std::string refusal() {
     boost::asio::io_context io;
     FakePort port;
@@ -111,8 +111,8 @@ TEST_F(UnixSocket, AsksOtherUsersForAToken) {
   base::write_file_atomically(config_.token_file, "view 0123456789abcdef\n", 0600);
   fs::permissions(folder_.path(), fs::perms::others_exec, fs::perm_options::add);
   const Rig rig(config_);
-  // The peer is who connects, whoever uses the socket then. The plain calls, since the C library's
-  // want to tell all threads, of which the child has none.
+  // The kernel's peer is the process that connects, whichever uses the socket later. Plain system
+  // calls: the C library's would signal all threads, and the child has none.
   base::UniqueFd fd(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0));
   const sockaddr_un address = address_of(path_);
   const pid_t child = ::fork();

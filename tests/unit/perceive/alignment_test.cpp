@@ -53,7 +53,7 @@ TEST(Align, ABallDoesNotShowItsRotationAndDoesNotRoll) {
     const Alignment found = align_to(ball, motion, noise_um);
     ASSERT_EQ(unobservable_of(found).size(), 3U);
     EXPECT_LT(error_of(found, motion).um, 6);
-    // Nothing turned: so the whole slide is found, though part of it might have been a roll.
+    // No rotation: the whole slide is found, though part of it might have been a roll.
     EXPECT_LT(Eigen::AngleAxisd(found.motion.linear()).angle(), 0.002);
     EXPECT_LT((found.motion.translation() - motion.translation()).norm(), 1e-5);
   }

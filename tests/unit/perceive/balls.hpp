@@ -16,7 +16,7 @@
 
 namespace dtact::perceive::test {
 
-/// A rigid thing of balls whose indentation is known exactly wherever it is: the deepest of theirs.
+/// A rigid object of balls. Its indentation is known exactly everywhere: that of the deepest ball.
 struct Balls {
   struct Ball {
     Eigen::Vector3d middle;  ///< Millimetres, surface frame.
@@ -25,7 +25,7 @@ struct Balls {
   std::vector<Ball> balls;
 };
 
-/// Four balls of 1.5 to 2.5 mm: no motion leaves their surface as it was.
+/// Four balls of 1.5 to 2.5 mm: every motion changes their surface.
 inline Balls bumps() {
   return {{{{-1.3, -0.9, 0.95}, 1.5},
            {{1.2, -1.1, 1.5}, 2.0},
@@ -33,7 +33,7 @@ inline Balls bumps() {
            {{2.2, 1.2, 1.1}, 1.5}}};
 }
 
-/// A cloud of their common surface, millimetres, of so many points on each ball.
+/// A cloud of `points` points on each ball's part of the common surface, millimetres.
 inline Mesh cloud_of(const Balls& object, int points = 20000) {
   Mesh mesh;
   for (const auto& ball : object.balls) {
@@ -50,12 +50,12 @@ inline Mesh cloud_of(const Balls& object, int points = 20000) {
   return mesh;
 }
 
-/// Of that cloud, named "balls".
+/// A model of that cloud, named "balls".
 inline std::shared_ptr<const ObjectModel> model_of(const Balls& object) {
   return std::make_shared<const ObjectModel>(make_object(cloud_of(object), 1e-3, "balls"));
 }
 
-/// Fingers whose field of 8 mm falls away by half a millimetre and more.
+/// Curved sensors whose field of 8 mm falls by half a millimetre and more.
 inline std::vector<recon::Surface> curved() {
   return {{recon::Surface::Kind::sphere, 15, 0, 20, 8, 1.41},
           {recon::Surface::Kind::cylinder, 12, 30, 20, 8, 1.41}};
@@ -68,12 +68,12 @@ inline Motion moved(const Eigen::Vector3d& mm,
          Motion(Eigen::AngleAxisd(degrees * M_PI / 180, axis.normalized()));
 }
 
-/// How deep the balls reach after `motion` along a surface's normal, millimetres.
+/// Indentation of the balls after `motion` along a surface's normal, millimetres.
 inline double indentation_mm(const Balls& object, const Motion& motion, const SurfacePoint& at) {
   const Eigen::Vector3d normal(at.normal.data());
   double depth = 0;
   for (const auto& ball : object.balls) {
-    // Where the normal leaves the ball, going inwards.
+    // The normal leaves the ball here, going inwards.
     const Eigen::Vector3d from =
         1e3 * (Eigen::Vector3d(at.point.data()) - motion * (1e-3 * ball.middle));
     const double over = from.dot(normal);
@@ -88,7 +88,7 @@ constexpr int kWidth = 176;
 constexpr int kHeight = 160;
 constexpr double kPx = 0.05;
 
-/// What does not change between frames on a surface: the rays take long.
+/// Data that is the same in all frames on a surface: casting the rays takes long.
 struct Gel {
   explicit Gel(const recon::Surface& surface) : maker(surface) {
     for (int row = 0; row < kHeight; ++row) {
@@ -102,7 +102,7 @@ struct Gel {
   CloudMaker maker;
   std::vector<SurfacePoint> pixels;
 };
-/// The same for the same surface.
+/// The same object for the same surface.
 inline Gel& gel_of(const recon::Surface& surface) {
   static std::deque<Gel> all;
   for (Gel& one : all) {
@@ -135,13 +135,13 @@ inline std::vector<double> blurred(const std::vector<double>& map) {
 
 /// One frame: the map, its points and the view of them.
 struct Frame {
-  /// The balls after `motion` in `surface`, with `noise_um` of noise that is alike over some
-  /// pixels, as the daemon's smoothing leaves it.
+  /// The balls after `motion` in `surface`, with `noise_um` of noise that is correlated over some
+  /// pixels, like the daemon's after smoothing.
   Frame(const Balls& object, const Motion& motion, double noise_um = 0, unsigned seed = 1,
         const recon::Surface& surface = {})
       : Frame([&](const SurfacePoint& at) { return indentation_mm(object, motion, at); }, noise_um,
               seed, surface) {}
-  /// What `depth_mm` says of each pixel's point of the surface.
+  /// `depth_mm` gives the indentation of each pixel's point of the surface.
   template <std::invocable<const SurfacePoint&> Depth>
   explicit Frame(Depth depth_mm, double noise_um = 0, unsigned seed = 1,
                  const recon::Surface& surface = {})
@@ -154,7 +154,7 @@ struct Frame {
     std::vector<double> depths;
     depths.reserve(values.size());
     for (const SurfacePoint& pixel : gel.pixels) depths.push_back(depth_mm(pixel));
-    // No gel has a kink at a contact's rim, nor does the camera see one: light scatters in it over
+    // A gel has no kink at a contact's rim, and the camera sees none: light scatters in it over
     // 0.2 mm. Two means over 7 pixels of 0.05 mm are as wide.
     for (int pass = 0; pass < 2; ++pass) depths = blurred(depths);
     for (int row = 0; row < kHeight; ++row) {
@@ -217,8 +217,8 @@ struct CoarseFrame {
   PointCloud cloud;
 };
 
-/// How far `found` is from `truth` about the contact: rotation in degrees and the shift of the
-/// contact's centre in micrometres, without what the shape does not show.
+/// Distance of `found` from `truth` at the contact: rotation in degrees and the shift of the
+/// contact's centre in micrometres, without the unobservable directions.
 struct Error {
   double degrees = 0;
   double um = 0;
@@ -227,7 +227,7 @@ inline Error error_of(const Alignment& found, const Motion& truth) {
   const Eigen::Matrix3d turn = found.motion.linear() * truth.linear().transpose();
   const Eigen::AngleAxisd angle(turn);
   Twist twist;
-  // Where the truth puts what is found at the centre.
+  // The position in `truth` of the point that is found at the centre.
   const Eigen::Vector3d there = truth * (found.motion.inverse() * found.centre);
   twist << found.arm * angle.angle() * angle.axis(), found.centre - there;
   for (const Twist& one : unobservable_of(found.covariance, found.centre, found.arm)) {

@@ -1,4 +1,4 @@
-// What CloudMaker leaves as it is, and what each instruction set makes, against points made anew.
+// Points that CloudMaker keeps and points of each instruction set, compared with points made anew.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -19,15 +19,15 @@ using Kind = recon::Surface::Kind;
 
 std::vector<recon::Surface> surfaces() {
   return {{},
-          {Kind::sphere, 4, 0, 20, 8, 1.41},  // rays at the map's corners miss it
+          {Kind::sphere, 4, 0, 20, 8, 1.41},  // rays at the map's corners miss this sphere
           {Kind::cylinder, 12, 30, 20, 8, 1.41}};
 }
 
 constexpr int kWidth = 150;  // four tiles and a part of one
 constexpr int kHeight = 110;
 
-/// 0 but for a ball that is `frame` · 7 pixels further right, some noise in it, and holes and lone
-/// pixels that come and go.
+/// 0 except for a ball that is `frame` · 7 pixels further right, some noise in it, and holes and
+/// single pixels that come and go.
 std::vector<std::int16_t> map_of(int frame) {
   std::mt19937 random(static_cast<unsigned>(frame));
   std::vector<std::int16_t> map(std::size_t{kWidth} * kHeight, 0);
@@ -48,7 +48,7 @@ std::vector<std::int16_t> map_of(int frame) {
     for (int row = 70; row < 95; ++row) {
       for (int column = 30; column < 80; ++column) at(row, column) = -32768;
     }
-    at(82, 50) = 0;  // alone, as deep as nothing
+    at(82, 50) = 0;  // alone among the holes, of depth 0
   }
   return map;
 }
@@ -62,7 +62,7 @@ DepthGrid grid_of(const std::vector<std::int16_t>& map) {
           .values = map};
 }
 
-/// As their bits are, every NaN alike.
+/// Compares bits; all NaNs count as equal.
 void expect_same(const PointCloud& actual, const PointCloud& expected, const char* what) {
   ASSERT_EQ(actual.values.size(), expected.values.size()) << what;
   for (std::size_t i = 0; i < actual.values.size(); ++i) {
@@ -77,7 +77,7 @@ void expect_same(const PointCloud& actual, const PointCloud& expected, const cha
 TEST(CloudMaker, WhatItLeavesIsWhatItWouldMake) {
   for (const recon::Surface& surface : surfaces()) {
     CloudMaker maker(surface);
-    CloudMaker other_maker(surface);  // of clouds that know nothing
+    CloudMaker other_maker(surface);  // writes to a new cloud each time
     PointCloud cloud;
     PointCloud coarse;
     for (int frame = 0; frame < 12; ++frame) {
@@ -113,7 +113,7 @@ TEST(CloudMaker, WhatItLeavesIsWhatItWouldMake) {
   }
 }
 
-// A sensor may change its resolution from one frame to the next; of a curved surface a table costs
+// A sensor may change its resolution from one frame to the next; a table for a curved surface costs
 // as much as hundreds of frames.
 TEST(CloudMaker, KeepsTheTablesOfThreeSizes) {
   CloudMaker maker(surfaces()[2]);

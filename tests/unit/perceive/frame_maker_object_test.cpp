@@ -1,4 +1,4 @@
-// Frames whose pose is a known object's.
+// Frames with the pose of a known object.
 #include <gtest/gtest.h>
 
 #include <chrono>
@@ -15,7 +15,7 @@ using namespace test;
 using Eigen::Vector3d;
 using v1::ObjectPose;
 
-/// As the daemon sends it.
+/// The frame's message, as the daemon sends it.
 v1::Frame sent(const Frame& seen, std::uint64_t sequence) {
   v1::Frame frame;
   frame.set_sequence(sequence);
@@ -52,8 +52,8 @@ ObjectPose pose_of(FrameMaker& maker, v1::Frame frame) {
   return made.pose();
 }
 
-/// The first pose that is not SEARCHING, of frames of the same contact that come until the search
-/// has ended: it is slow where threads are watched.
+/// The first pose that is not SEARCHING, while frames of the same contact come. The search
+/// is slow under the thread sanitizer.
 ObjectPose found(FrameMaker& maker, const Frame& seen, std::uint64_t& sequence) {
   const auto end = std::chrono::steady_clock::now() + std::chrono::minutes(4);
   for (;;) {
@@ -96,8 +96,8 @@ TEST(FrameMakerOfAnObject, SearchesFindsAndFollowsInEachContact) {
   }
 }
 
-// Another calibration may lay the same pixels elsewhere, and a daemon that was away says nothing of
-// what happened meanwhile.
+// Another calibration may place the same pixels elsewhere, and a daemon that was away does not
+// report what happened meanwhile.
 TEST(FrameMaker, AnotherCalibrationAndAReleaseBeginAnotherContact) {
   FrameMaker maker;
   const Frame seen(bumps(), Motion::Identity(), 5);

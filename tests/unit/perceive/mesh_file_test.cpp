@@ -26,7 +26,7 @@ std::string error_of(const std::string& bytes) {
   return "none";
 }
 
-/// Six times the volume within, from outward triangles.
+/// Six times the enclosed volume, from outward triangles.
 double volume_of(const Mesh& mesh) {
   double sum = 0;
   for (const auto& t : mesh.triangles) {

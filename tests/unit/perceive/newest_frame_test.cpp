@@ -1,4 +1,4 @@
-// What is known of frames that nobody took.
+// What is known of frames that were not taken.
 #include "clients/perceive/newest_frame.hpp"
 
 #include <gtest/gtest.h>
@@ -21,7 +21,7 @@ TEST(NewestFrame, IsTakenOnceAndCountsWhatItReplaced) {
   ASSERT_TRUE(taken.has_value());
   EXPECT_EQ(taken->frame.sequence(), 3U);
   EXPECT_EQ(taken->missed, 2U);
-  EXPECT_FALSE(taken->parted) << "it was touched throughout";
+  EXPECT_FALSE(taken->parted) << "it was in contact throughout";
   EXPECT_FALSE(newest.take().has_value());
 }
 
@@ -37,7 +37,7 @@ TEST(NewestFrame, AReleaseThatWasReplacedIsReported) {
   EXPECT_FALSE(newest.take()->parted) << "once";
 }
 
-// In a daemon's other life the same sequence may be another frame.
+// After a restart of the daemon the same sequence may be another frame.
 TEST(NewestFrame, OfAnotherConnectionItIsAnotherContact) {
   NewestFrame newest;
   newest.put(frame_of(1, true));
@@ -48,7 +48,7 @@ TEST(NewestFrame, OfAnotherConnectionItIsAnotherContact) {
   EXPECT_TRUE(newest.take()->parted);
 }
 
-// A frame that says nothing of contact, as while the light settles, is no release.
+// A frame without a contact measurement, as while the light settles, is not a release.
 TEST(NewestFrame, WhatWasNotMeasuredIsNoRelease) {
   NewestFrame newest;
   newest.put({});

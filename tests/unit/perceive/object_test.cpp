@@ -1,4 +1,4 @@
-// Known objects made of balls: their samples, where search() finds them, and how they are followed.
+// Known objects made of balls: their samples, the poses that search() finds, and their tracking.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -38,7 +38,7 @@ Error off(const Tracker::Pose& pose, const Motion& truth) {
   return error_of(pose.alignment, truth);
 }
 
-/// A placement as the pose of the contact that it was found in.
+/// A placement as the pose of the contact in which it was found.
 Alignment alignment_of(const Placement& found, const ContactPatch& patch) {
   Alignment alignment;
   alignment.motion = found.pose;
@@ -63,7 +63,7 @@ TEST(ObjectModel, ABoxIsSampledEvenlyAndRestsOnSixFaces) {
     Eigen::Index axis = 0;
     EXPECT_NEAR(surfel.normal.cwiseAbs().maxCoeff(&axis), 1, 1e-12);
     ++by_axis.at(static_cast<std::size_t>(axis));
-    // Into it.
+    // The normal points into the object.
     EXPECT_GT(surfel.normal.dot(Vector3d(0.002, 0.0025, 0.003) - surfel.point), 0);
   }
   // Faces of 30, 24 and 20 mm².
@@ -90,7 +90,7 @@ TEST(ObjectModel, AWrongUnitAndAnInsideOutShapeAreReported) {
 
 TEST(ObjectModel, ASparseCloudIsRefused) {
   const Balls ball{{{{0, 0, 3.0}, 4.0}}};
-  // 201 mm² by so many points.
+  // The points share 201 mm².
   EXPECT_THAT(message_of(cloud_of(ball, 4000), 1e-3),
               testing::HasSubstr("at most 0.15 mm is needed"));
   EXPECT_EQ(message_of(cloud_of(ball, 12000), 1e-3), "none");
@@ -150,7 +150,7 @@ TEST(ObjectTracker, SearchesFindsAndFollowsWithoutWaiting) {
   Frame frame(bumps(), moved({0, 0, 0}, Vector3d::UnitZ(), 60), 5);
   EXPECT_EQ(tracker.follow(frame.view(), 10).state, State::searching);
   EXPECT_TRUE(tracker.is_searching());
-  // It moves on while it is searched for.
+  // The object moves on during the search.
   const Motion next = moved({0.1, 0, 0}, Vector3d::UnitZ(), 62);
   const Frame second(bumps(), next, 5, 2);
   (void)tracker.follow(second.view(), 11);
@@ -190,13 +190,13 @@ TEST(ObjectTracker, AnotherContactBeginsWithASearch) {
   tracker.release();
   EXPECT_EQ(tracker.pose().state, State::idle);
   tracker.wait();
-  // What was found belongs to the contact before.
+  // The result of the search belongs to the contact before.
   EXPECT_EQ(tracker.follow(frame.view(), 2).state, State::searching);
   tracker.wait();
   EXPECT_EQ(tracker.follow(frame.view(), 3).state, State::started);
 }
 
-// As files of large assemblies have it: a degree of a first correction is 1.7 mm there.
+// Files of large assemblies have this: a first correction by a degree is 1.7 mm there.
 TEST(ObjectTracker, TheFilesOriginMayLieFarFromTheContact) {
   const Vector3d far(100, 0, 0);
   Balls object = bumps();
@@ -215,8 +215,8 @@ TEST(ObjectTracker, TheFilesOriginMayLieFarFromTheContact) {
   }
 }
 
-// A ball with a bump, rolled until the bump has left the contact: what turns it from there on is
-// seen neither on the ball nor by the contact's motion.
+// A ball with a bump rolls until the bump has left the contact. Its rotation from there on is
+// visible neither on the ball nor in the contact's motion.
 TEST(ObjectTracker, WhatNobodyFollowsIsReported) {
   const Balls object{{{{0, 0, 3.2}, 4.0}, {{2.2, 0, 1.1}, 1.5}}};
   ObjectTracker tracker(model_of(object));
@@ -228,7 +228,7 @@ TEST(ObjectTracker, WhatNobodyFollowsIsReported) {
   (void)tracker.follow(first.view(), 1);
   tracker.wait();
   EXPECT_EQ(tracker.follow(first.view(), 2).state, State::started);
-  // About the line between the middles.
+  // The rotation about the line between the middles.
   EXPECT_EQ(tracker.pose().unobservable.size(), 1U);
   for (unsigned i = 1; i <= 20; ++i) {
     const Frame frame(object, rolled(-1.0 * i), 2, i);
@@ -237,7 +237,7 @@ TEST(ObjectTracker, WhatNobodyFollowsIsReported) {
   }
   const std::vector<Twist>& unknown = tracker.pose().unobservable;
   ASSERT_GE(unknown.size(), 2U);
-  // Turns about the ball's middle: points of it do not move along the normal.
+  // Rotations about the ball's middle: its points do not move along the normal.
   for (const Twist& one : unknown) EXPECT_GT(one.head<3>().norm(), 0.3);
 }
 
@@ -254,9 +254,9 @@ Frame pressed_face(double x, double y, const Vector3d& middle, unsigned seed) {
       2, seed);
 }
 
-// A third of the face lies where it lay, and a flat face fits a flat place wherever it is.
+// A third of the face overlaps its old position, and a flat face fits any flat place.
 TEST(ObjectTracker, AFaceThatJumpsAlongItselfIsLostAndFound) {
-  // A flat face is found by its outline, which the gel rounds: found is what lies within 0.5 mm.
+  // A flat face is found by its outline, which the gel rounds: found means within 0.5 mm.
   constexpr double kFaceUm = 500;
   ObjectTracker tracker(
       std::make_shared<const ObjectModel>(make_object(box(4, 3, 2), 1e-3, "box")));
@@ -295,7 +295,7 @@ TEST(ObjectTracker, WhatIsNotFoundIsSearchedForEverMoreSeldom) {
     ++searches;
     tracker.wait();
   }
-  // The first at once, then 30, 60, 120 and 240 frames after the one before.
+  // The first search is at once, the next 30, 60, 120 and 240 frames after the one before.
   EXPECT_EQ(searches, 5);
 }
 

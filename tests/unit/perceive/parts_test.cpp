@@ -1,4 +1,4 @@
-// What dtact-perceive makes messages of, and messages into.
+// The parts of dtact-perceive that read and write messages.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -39,7 +39,7 @@ v1::DepthMap map_of(const std::vector<std::int16_t>& values) {
 TEST(DepthCrop, CutsRegionsOfTheCalibrationsResolution) {
   DepthCrop part(map_of({0, 1, 2, 3, 10, 11, 12, 13, 20, 21, 22, 23}));
   EXPECT_EQ(part.whole().full_width, 100);
-  // 23 … 26: grown to the map's columns 11 … 13.
+  // 23 … 26, extended to the map's columns 11 … 13.
   const auto cut = part.cut({23, 42, 4, 1});
   ASSERT_TRUE(cut.has_value());
   EXPECT_EQ(cut->x, 11);
@@ -76,7 +76,7 @@ TEST(DepthCrop, TheContactHasAMargin) {
   EXPECT_EQ(contact->height, 3);
 }
 
-// As where the daemon's contact.threshold_mm is 0.03.
+// The daemon's contact.threshold_mm is 0.03.
 TEST(DepthCrop, ALightPressHasAContactAsWell) {
   std::vector<std::int16_t> values(12, 20);
   values[5] = 42;
@@ -140,7 +140,7 @@ TEST(PoseMessage, MillimetresAndDegrees) {
   EXPECT_EQ(message.unobservable(0).translation().y(), 1);
 }
 
-/// The same as all of a map.
+/// The map as a part that covers the whole.
 v1::DepthMap whole(v1::DepthMap map) {
   map.clear_x();
   map.clear_y();
@@ -149,7 +149,7 @@ v1::DepthMap whole(v1::DepthMap map) {
   return map;
 }
 
-/// With a depth map; touching 23 um deep.
+/// A frame with a depth map, indented by 23 µm.
 v1::Frame frame_of(bool in_contact) {
   v1::Frame frame;
   frame.set_sequence(5);

@@ -23,7 +23,7 @@ struct Map {
   std::int16_t& at(int row, int column) {
     return values[static_cast<std::size_t>(row * grid.width + column)];
   }
-  /// A part of it.
+  /// A part of the map.
   Map cut(int x, int y, int width, int height) {
     Map part(width, height, grid.mm_per_px);
     part.grid.x = x;
@@ -86,7 +86,7 @@ TEST(PointCloud, AFlatMapIsAPlane) {
   }
 }
 
-// One millimetre deeper for each to the right: the surface falls away at 45° and looks right.
+// One millimetre deeper for each to the right: the surface falls at 45° and faces right.
 TEST(PointCloud, ASlopesNormalAlsoAtTheMapsEnds) {
   Map map(9, 4, 0.1);
   for (int row = 0; row < 4; ++row) {
@@ -174,7 +174,7 @@ TEST(PointCloud, AStrideTakesTheSamePixelsOfEveryPart) {
   EXPECT_EQ(cut.y, 42);
   EXPECT_EQ(cut.width, 5);
   EXPECT_EQ(cut.height, 5);
-  // Metres, in the middle: what processors round differently.
+  // Metres, in the middle of the map: processors round these differently.
   EXPECT_NEAR(cut.part(PointCloud::kX)[12], fine.part(PointCloud::kX)[50 * 101 + 50], 1e-9);
   EXPECT_EQ(cut.part(PointCloud::kZ)[12], fine.part(PointCloud::kZ)[50 * 101 + 50]);
 }

@@ -13,7 +13,7 @@ using namespace test;
 using Eigen::Vector3d;
 using State = Tracker::State;
 
-/// Moved over `frames` frames to `end_mm` and `degrees` about `axis`; the error at the end.
+/// Follows `frames` frames that move to `end_mm` and `degrees` about `axis`; the error at the end.
 Error follow(Tracker& tracker, const Vector3d& end_mm, const Vector3d& axis, double degrees,
              int frames, double noise_um) {
   Error error;
@@ -59,7 +59,7 @@ TEST(Tracker, RollsAndPressesDeeper) {
   EXPECT_LT(error.degrees, 0.8);
 }
 
-// Round the finger, so that it stays as deep: three millimetres and a twist.
+// Round the finger at the same depth: three millimetres and a twist.
 TEST(Tracker, SlidesRoundAFinger) {
   for (const recon::Surface& surface : curved()) {
     const double radius_mm = surface.radius_mm;
@@ -88,7 +88,7 @@ TEST(Tracker, StandsStillWithoutDrifting) {
   EXPECT_LT(error.degrees, 0.3);
 }
 
-// As a daemon does whose map's resolution is "auto": full, a quarter and a half of it in turn.
+// A daemon with resolution "auto" does this: full, a quarter and a half in turn.
 TEST(Tracker, FollowsThroughChangesOfResolution) {
   Tracker tracker;
   for (unsigned i = 0; i <= 40; ++i) {
@@ -103,7 +103,7 @@ TEST(Tracker, FollowsThroughChangesOfResolution) {
   }
 }
 
-// Of 1.5 mm², which are 600 pixels at full resolution and fewer than 40 at a quarter.
+// A contact of 1.5 mm²: 600 pixels at full resolution, fewer than 40 at a quarter.
 TEST(Tracker, FollowsASmallTipAtAQuarterOfTheResolution) {
   Tracker tracker;
   for (unsigned i = 0; i <= 20; ++i) {
@@ -116,8 +116,8 @@ TEST(Tracker, FollowsASmallTipAtAQuarterOfTheResolution) {
   }
 }
 
-// A plate over all of the map, of which no edge is seen, is pushed to the right until its left edge
-// is in view: how far it went before is not known however well the edge is followed later.
+// A plate over all of the map shows no edge. It is pushed to the right until its left edge is in
+// view: the distance before that stays unknown however well the edge is followed later.
 TEST(Tracker, WhatWasNotSeenOnTheWayStaysReported) {
   Tracker tracker;
   for (unsigned i = 0; i <= 60; ++i) {
@@ -137,8 +137,8 @@ TEST(Tracker, WhatWasNotSeenOnTheWayStaysReported) {
 }
 
 // In the first frames the contact is half a millimetre wide and the noise a fifteenth of its depth.
-// The seeds are those of 200 whose ball turned by more than half a degree where a direction was
-// taken for seen too easily, and one more.
+// With these seeds of 200 the ball turned by more than half a degree where a direction was too
+// easily taken as observed; one more seed is added.
 TEST(Tracker, ABallThatIsPressedInIsNotTurnedByNoise) {
   for (const unsigned seed : {0U, 101U, 118U, 122U}) {
     Tracker tracker;
@@ -160,7 +160,7 @@ TEST(Tracker, ABallThatIsPressedInIsNotTurnedByNoise) {
   }
 }
 
-// The daemon says 50 µm of an old calibration, of bias and blur for the most part. A ball of 4 mm,
+// The daemon states 50 µm for an old calibration, mostly from bias and blur. A ball of 4 mm,
 // pressed in by 0.1 mm, is deeper than 30 µm over 2π · 4 mm · 0.07 mm.
 TEST(Tracker, FollowsALightPressOfAnUncertainCalibration) {
   Tracker tracker;
@@ -175,9 +175,9 @@ TEST(Tracker, FollowsALightPressOfAnUncertainCalibration) {
   }
 }
 
-// A ball of 4 mm that touches to 0.9 of Hertz's radius, and around it gel that follows over 0.3
-// millimetres. Of the first touch much is such a shoulder, which lies on nothing later; its
-// area doubles too late.
+// A ball of 4 mm in contact to 0.9 of Hertz's radius; the gel around it follows over 0.3 mm. Much
+// of the first contact is this shoulder, which has nothing below it later; its area doubles too
+// late.
 TEST(Tracker, ABallThatIsPressedInOutgrowsTheShouldersOfItsFirstTouch) {
   Tracker tracker;
   for (unsigned i = 0; i <= 30; ++i) {

@@ -1,4 +1,4 @@
-// What dtact-perceive asks the daemon for, of what its own clients want.
+// What dtact-perceive subscribes to, depending on its own clients.
 #include "clients/perceive/upstream_subscription.hpp"
 
 #include <gtest/gtest.h>

@@ -14,7 +14,7 @@ namespace {
 
 constexpr int kFrames = 16;
 
-/// Of a toy sensor's gel with marks two levels high.
+/// Marks of a toy sensor's gel, two levels high.
 std::shared_ptr<const GelMarks> calibrated(const recon::FrameRegion& part = {0, 0, fakes::kToyWidth,
                                                                              fakes::kToyHeight}) {
   return std::make_shared<const GelMarks>(fakes::toy_reference_q8({.marks = 2}), fakes::kToyWidth,
@@ -25,7 +25,7 @@ class CameraShiftDetectorTest : public ::testing::Test {
  protected:
   CameraShiftDetectorTest() { thread.start(); }
 
-  /// So many frames of a gel that lies `dx` pixels to the right of where it was at calibration.
+  /// Shows `frames` frames of a gel that is `dx` pixels right of its position at calibration.
   void show(int frames, int dx, bool no_contact = true) {
     for (int i = 0; i < frames; ++i) {
       fakes::ToyFrame frame({.marks = 2, .marks_px = dx}, sequence);
@@ -42,7 +42,7 @@ class CameraShiftDetectorTest : public ::testing::Test {
 
   base::BackgroundThread thread{"side"};
   CameraShiftDetector watch{fakes::kToyWidth, fakes::kToyHeight, kFrames, thread};
-  int still_columns = 0;  ///< At the left, of what is shown.
+  int still_columns = 0;  ///< Columns at the left that do not move.
   std::uint64_t sequence = 0;
   std::int64_t now_ns = 0;
 };

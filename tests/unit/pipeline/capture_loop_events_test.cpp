@@ -1,4 +1,4 @@
-// What frames, events and answers tell of what the loop measured.
+// Frames, events and answers report what the loop measured.
 #include <gtest/gtest.h>
 
 #include <cstddef>
@@ -10,7 +10,7 @@
 #include "daemon/pipeline/capture_loop.hpp"
 #include "tests/fakes/stepped_loop.hpp"
 
-// begin() of the fake makes what the optionals hold.
+// begin() of the fake sets the optionals.
 // NOLINTBEGIN(bugprone-unchecked-optional-access)
 namespace dtact::pipeline {
 namespace {
@@ -27,7 +27,7 @@ TEST(CaptureLoop, StampsAFrameWithTheWallTimeOfItsExposure) {
   EXPECT_EQ(loop.frame->wall_ns, loop.frame->camera.timestamp_ns + fakes::FakeClock::kWallOffset);
 }
 
-// The light changes while something is held. What is measured meanwhile is nothing at all.
+// The light changes while an object is pressed in. Nothing is measured meanwhile.
 TEST(CaptureLoop, WhatIsHeldWhileAReferenceIsTakenIsNotLost) {
   SteppedLoop loop;
   loop.begin(toy_calibration());
@@ -124,7 +124,7 @@ TEST(CaptureLoop, AFrameKnowsSinceWhenItsLightShows) {
   EXPECT_EQ(loop.light->light_since_ns(), loop.frame->light_since_ns);
 }
 
-// A stamp at the frame's end lies a period after the exposure that shows the light.
+// A stamp at the frame's end is a period after the exposure that shows the light.
 TEST(CaptureLoop, SinceWhenALightShowsIsInTheFramesOwnTimestamps) {
   SteppedLoop loop;
   loop.camera.meaning = hal::TimestampMeaning::end_of_frame;
@@ -178,7 +178,7 @@ TEST(CaptureLoop, CopiesTheReferenceImageOut) {
   EXPECT_EQ(loop.all<CommandDone>()[1].outcome, Outcome::done);
   EXPECT_EQ(copy.sequence, loop.all<ReferenceTaken>().at(0).at.sequence);
   EXPECT_EQ(copy.light, loop.config.light);
-  // The toy's surface is untouched: the reference is the image itself.
+  // The toy has no contact: the reference is the image itself.
   std::vector<std::uint8_t> pixels(copy.image_q8.size() + hal::kLumaPadding);
   fakes::toy_paint({}, 1, pixels.data());
   const std::size_t centre = copy.image_q8.size() / 2 + fakes::kToyWidth / 2;

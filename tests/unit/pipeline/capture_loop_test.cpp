@@ -10,7 +10,7 @@
 
 #include "tests/fakes/stepped_loop.hpp"
 
-// begin() of the fake makes what the optionals hold.
+// begin() of the fake sets the optionals.
 // NOLINTBEGIN(bugprone-unchecked-optional-access)
 namespace dtact::pipeline {
 namespace {
@@ -18,7 +18,7 @@ namespace {
 using fakes::SteppedLoop;
 using fakes::toy_calibration;
 
-// 991 µm were served where 960 are true.
+// Without it 991 µm are served where 960 are true.
 TEST(CaptureLoop, FollowsTheLightBesideAPressThatLasts) {
   SteppedLoop loop(10);
   loop.begin(toy_calibration());
@@ -37,7 +37,7 @@ TEST(CaptureLoop, FollowsTheLightBesideAPressThatLasts) {
   EXPECT_NEAR(loop.frame->contact.deepest_mm, before_mm, 0.010);
   EXPECT_NEAR(loop.exchange.light_followed, -0.006, 0.001);
   EXPECT_TRUE(loop.frame->health.empty());
-  // Other maps of the same calibration know what is known of the light.
+  // Other maps of the same calibration keep the known state of the light.
   const auto model = toy_calibration()->model;
   ASSERT_TRUE(loop.submit(
       SetReconstruction{{},
@@ -60,7 +60,7 @@ TEST(CaptureLoop, ACameraThatHalvesItsRateIsNamedWithoutLosses) {
   ASSERT_TRUE(loop.until([&] { return loop.health().empty(); }, 120));
 }
 
-// A daemon that cannot keep up skips frames: no cable is to blame.
+// A daemon that cannot keep up skips frames: the cable is not the cause.
 TEST(CaptureLoop, FramesThatWereSkippedAreNotLost) {
   SteppedLoop loop;
   loop.begin(toy_calibration());
@@ -97,7 +97,7 @@ TEST(CaptureLoop, TheConfiguredDelayOfTheLightTakesThePlaceOfTheCameras) {
   EXPECT_TRUE(loop.health().empty());
 }
 
-// The light that nobody can follow, since it came too fast, is in what the map states.
+// A change of light that is too fast to follow is part of the map's uncertainty.
 TEST(CaptureLoop, StatesWhatOfTheLightItDoesNotFollow) {
   SteppedLoop loop;
   loop.begin(toy_calibration());
@@ -111,7 +111,7 @@ TEST(CaptureLoop, StatesWhatOfTheLightItDoesNotFollow) {
   EXPECT_NEAR(loop.frame->uncertainty_um, std::hypot(before_um, 45), 3);
 }
 
-// Too much of the field is another for the light to be told from it.
+// Too much of the field changes for the light to be measured beside it.
 TEST(CaptureLoop, StatesHowFarTheLightMayHaveMovedOutOfSight) {
   SteppedLoop loop(10);
   loop.begin(toy_calibration());
@@ -176,7 +176,7 @@ TEST(CaptureLoop, ACameraOpenedAnewBeginsAnew) {
   loop.begin(toy_calibration());
   ASSERT_TRUE(loop.until_fresh());
   const std::size_t taken = loop.all<ReferenceTaken>().size();
-  // A stall: it was never away. The controls are set anew, and the image is another.
+  // A stall: the camera was never away. The controls are set again, and the image is another.
   loop.camera.status = hal::GrabStatus::timeout;
   loop.step(200);
   loop.camera.status = hal::GrabStatus::ok;
@@ -229,7 +229,7 @@ TEST(CaptureLoop, ARezeroOfACameraThatWentAwayIsGivenUp) {
   EXPECT_EQ(answers[0].outcome, Outcome::camera_away);
   loop.camera.status = hal::GrabStatus::ok;
   ASSERT_TRUE(loop.until([&] { return loop.frame->has_depth; }));
-  EXPECT_NEAR(loop.frame->contact.deepest_mm, 1, 0.05) << "the touched image is no reference";
+  EXPECT_NEAR(loop.frame->contact.deepest_mm, 1, 0.05) << "an image with contact is no reference";
 }
 
 TEST(CaptureLoop, MakesNoDepthThatNobodyListensTo) {
@@ -245,7 +245,7 @@ TEST(CaptureLoop, MakesNoDepthThatNobodyListensTo) {
   for (const StageStatistics& stage : loop.exchange.statistics.stages()) {
     EXPECT_NE(stage.stage, std::string("lut"));
   }
-  // The light and what the picture shows are looked at all the same.
+  // The light and the picture are checked all the same.
   loop.camera.scene = {};
   loop.step(20);
   loop.camera.scene.light = 0.98;
@@ -259,7 +259,7 @@ TEST(CaptureLoop, MakesNoDepthThatNobodyListensTo) {
   EXPECT_NEAR(loop.all<ContactChanged>()[0].contact.deepest_mm, 1, 0.05);
 }
 
-// Light changes during contact that nobody listens to: what is active counts as touch.
+// Light changes during contact without a subscriber: active tiles count as contact.
 TEST(CaptureLoop, TakesNoReferenceInContactThatNobodyHears) {
   SteppedLoop loop;
   loop.exchange.want_contact = loop.exchange.want_depth = false;
@@ -267,7 +267,7 @@ TEST(CaptureLoop, TakesNoReferenceInContactThatNobodyHears) {
   loop.light->start();
   loop.step(100);
   ASSERT_EQ(loop.exchange.state, State::serving);
-  // 3.4 % of the light: a touch (2.5 %), but not if the surface had been untouched before (4 %).
+  // 3.4 % of the light: contact (2.5 %), but not if the frame before had no contact (4 %).
   loop.camera.scene.press_mm = 0.17;
   loop.step(20);
   hal::Light dim = loop.config.light;
@@ -328,7 +328,7 @@ TEST(CaptureLoop, BeyondTheLutIsCountedInTheCalibrationsPixels) {
   loop.config.reconstruction.decimation = 4;
   loop.begin(toy_calibration());
   ASSERT_TRUE(loop.until_fresh());
-  // 94 grey levels where the list ends at 70: within 6.5 pixels of the middle, eight coarse ones.
+  // 94 grey levels where the LUT ends at 70: within 6.5 pixels of the middle, eight coarse ones.
   loop.camera.scene.press_mm = 3;
   loop.step(10);
   EXPECT_TRUE(loop.frame->health.has(Health::beyond_calibration));

@@ -44,7 +44,7 @@ class CellsTest : public testing::Test {
     luma.resize(luma.size() + 64);
     return luma;
   }
-  std::vector<std::uint8_t> untouched(double noise = 1) {
+  std::vector<std::uint8_t> no_contact(double noise = 1) {
     return frame([](int, int) { return 0.0; }, noise);
   }
   int active_tiles(const std::vector<std::uint8_t>& luma) {
@@ -57,7 +57,7 @@ class CellsTest : public testing::Test {
     cells_.set_reference(reference_);
   }
   void settle(int frames = 30) {
-    for (int i = 0; i < frames; ++i) (void)active_tiles(untouched());
+    for (int i = 0; i < frames; ++i) (void)active_tiles(no_contact());
   }
   void SetUp() override { cells_.set_reference(reference_); }
 
@@ -76,21 +76,21 @@ class CellsTest : public testing::Test {
 
 // Ten rows of cells, from the frame's first row on.
 TEST_F(CellsTest, ReportsWhichRowsAreNotNew) {
-  const auto first = untouched();
+  const auto first = no_contact();
   (void)active_tiles(first);
-  auto second = untouched();
+  auto second = no_contact();
   (void)active_tiles(second);
   EXPECT_EQ(report_.frame.unchanged_rows, 0);
   (void)active_tiles(second);
   EXPECT_EQ(report_.frame.unchanged_rows, 10);
-  auto torn = untouched();
+  auto torn = no_contact();
   std::copy(second.begin() + 82 * kFrameWidth, second.end(), torn.begin() + 82 * kFrameWidth);
   (void)active_tiles(torn);
   EXPECT_EQ(report_.frame.unchanged_rows, 4);  // from row 96 on; the torn one is new in part
 }
 
 TEST_F(CellsTest, WhiteRowsAreNotCalledRepeated) {
-  const std::vector<std::uint8_t> white(untouched().size(), 255);
+  const std::vector<std::uint8_t> white(no_contact().size(), 255);
   (void)active_tiles(white);
   (void)active_tiles(white);
   EXPECT_EQ(report_.frame.unchanged_rows, 0);
@@ -136,12 +136,12 @@ TEST_F(CellsTest, FineBandsRippleInHalfRows) {
 }
 
 TEST_F(CellsTest, NoiseAloneIsNoContact) {
-  for (int i = 0; i < 500; ++i) ASSERT_EQ(active_tiles(untouched()), 0) << i;
+  for (int i = 0; i < 500; ++i) ASSERT_EQ(active_tiles(no_contact()), 0) << i;
 }
 
 TEST_F(CellsTest, HealthIsGatheredInTheSameLook) {
   settle();
-  auto luma = untouched();
+  auto luma = no_contact();
   for (int x = 64; x < 80; ++x) {
     luma[pixel(x, 100, kFrameWidth)] = 255;
     luma[pixel(x, 102, kFrameWidth)] = 2;
@@ -166,10 +166,10 @@ TEST_F(CellsTest, APressIsActiveWhereItIsAndNotElsewhere) {
   EXPECT_EQ(tiles_[70 / 16] >> (60 / 32) & 1U, 1U);
   EXPECT_EQ(tiles_[70 / 16] >> (180 / 32) & 1U, 0U);
   EXPECT_LT(active, kTiles * 6 / 10);
-  EXPECT_EQ(active_tiles(untouched()), 0) << "gone when the press is gone";
+  EXPECT_EQ(active_tiles(no_contact()), 0) << "gone when the press is gone";
 }
 
-// What CellSettings promises: nothing above these peaks is hidden, wherever it lies.
+// CellSettings promises this: no press above these peaks stays undetected anywhere.
 TEST_F(CellsTest, AFaintWidePressIsFound) {
   for (const double sign : {-1.0, 1.0}) {
     settle();
@@ -184,13 +184,13 @@ TEST_F(CellsTest, AFaintWidePressIsFound) {
 
 TEST_F(CellsTest, ASpotOfTheGelsBlurIsFoundWhereverItLies) {
   // Scattering of 0.3 mm is a standard deviation of 8 pixels at 0.0375 mm a pixel. 0.8 levels at
-  // the peak are 26 µm. Without noise, so that it is the cells' places that are tried.
+  // the peak are 26 µm. There is no noise, so that only the cells' places matter.
   for (int dy = 0; dy < 16; dy += 3) {
     for (int dx = 0; dx < 16; dx += 3) {
       cells_.set_reference(reference_);
       const auto spot = [&](int x, int y) {
         const double r2 = (x - 90 - dx) * (x - 90 - dx) + (y - 70 - dy) * (y - 70 - dy);
-        // Noise is what carries fractions of a level through the rounding to 8 bits.
+        // Noise carries fractions of a level through the rounding to 8 bits.
         return 0.8 * std::exp(-r2 / (2 * 8.0 * 8.0)) + ((x * 7 + y * 13) % 16 - 7.5) / 16;
       };
       EXPECT_GT(active_tiles(frame(spot, 0)), 0) << dx << ", " << dy;
@@ -199,7 +199,7 @@ TEST_F(CellsTest, ASpotOfTheGelsBlurIsFoundWhereverItLies) {
 }
 
 TEST_F(CellsTest, BelowHalfTheThresholdItLetsGo) {
-  // So little noise that no window strays by more than 0.05 levels.
+  // The noise is so low that no window's mean is off by more than 0.05 levels.
   const auto level = [this](double grey) {
     return active_tiles(frame([grey](int x, int) { return x < 120 ? grey : 0.0; }, 0.3));
   };
@@ -246,7 +246,7 @@ TEST_F(CellsTest, DriftEndsAtItsLimit) {
 
 TEST_F(CellsTest, ReportsAChangeOfLightFromAPress) {
   settle();
-  (void)active_tiles(untouched());
+  (void)active_tiles(no_contact());
   EXPECT_EQ(report_.light.from, LightSeen::From::all);
   EXPECT_NEAR(report_.light.change, 0, 0.0002);
   const auto dimmed = [&](double share, double press) {
@@ -271,12 +271,12 @@ TEST_F(CellsTest, KnowsTheLightItWasReported) {
   const auto dimmed = [this] { return frame([](int, int) { return 3.0; }); };
   EXPECT_GT(active_tiles(dimmed()), 0);
   cells_.set_light(0.98);
-  for (int i = 0; i < 10; ++i) (void)active_tiles(dimmed());  // what was active lets go
+  for (int i = 0; i < 10; ++i) (void)active_tiles(dimmed());  // the active tiles become inactive
   EXPECT_EQ(active_tiles(dimmed()), 0);
   EXPECT_NEAR(report_.light.change, 0, 0.0002);
-  EXPECT_GT(active_tiles(untouched()), 0);
+  EXPECT_GT(active_tiles(no_contact()), 0);
   cells_.set_reference(reference_);
-  EXPECT_EQ(active_tiles(untouched()), 0) << "a new reference is under its own light";
+  EXPECT_EQ(active_tiles(no_contact()), 0) << "a new reference is under its own light";
 }
 
 TEST_F(CellsTest, WhatWasFollowedBeforeIsPartOfTheLight) {
@@ -291,7 +291,7 @@ TEST_F(CellsTest, WhatWasFollowedBeforeIsPartOfTheLight) {
 }
 
 // 60 s of a press in which the light falls by half a level, then the press is lifted: drift has
-// followed the light by then, and set_light() says the same once more.
+// followed the light by then, and set_light() reports the same once more.
 TEST_F(CellsTest, LightThatWasFollowedAsDriftCountsOnce) {
   CellSettings settings;
   settings.drift_per_frame = 0.01;
@@ -310,7 +310,7 @@ TEST_F(CellsTest, LightThatWasFollowedAsDriftCountsOnce) {
   EXPECT_NEAR(report_.drift, 0, 0.05);
 }
 
-// Drift had followed what went back in a step: every cell is active, and yet the frame is the
+// Drift had followed a change that went back in a step: every cell is active, yet the frame is the
 // reference.
 TEST_F(CellsTest, DriftThatTheFrameContradictsIsForgotten) {
   CellSettings settings;
@@ -320,14 +320,14 @@ TEST_F(CellsTest, DriftThatTheFrameContradictsIsForgotten) {
     (void)active_tiles(frame([&](int, int) { return std::min(0.002 * i, 0.6); }));
   }
   ASSERT_LT(report_.drift, -0.5);
-  EXPECT_EQ(active_tiles(untouched()), kTiles);
-  EXPECT_EQ(active_tiles(untouched()), 0);
+  EXPECT_EQ(active_tiles(no_contact()), kTiles);
+  EXPECT_EQ(active_tiles(no_contact()), 0);
   EXPECT_EQ(report_.drift, 0);
 }
 
 TEST_F(CellsTest, SeesTheLightBesideAPress) {
   settle(32);
-  // A ball's ring: brighter around the press by less than what is active.
+  // A ball's ring: brighter around the press by less than the threshold of an active cell.
   const auto press = [](int x, int y) {
     const double r = std::hypot(x - 60, y - 70);
     return r < 25 ? 20.0 : r < 45 ? -0.2 : 0.0;
@@ -342,7 +342,7 @@ TEST_F(CellsTest, SeesTheLightBesideAPress) {
   EXPECT_EQ(seen, 2) << "on every sixteenth frame";
   for (int i = 0; i < 16; ++i) {
     (void)active_tiles(frame([](int x, int y) { return x < 160 ? 20.0 : 0.02 * y; }));
-    EXPECT_EQ(report_.light.from, LightSeen::From::nothing) << "too little is left untouched";
+    EXPECT_EQ(report_.light.from, LightSeen::From::nothing) << "too little is left without contact";
   }
 }
 

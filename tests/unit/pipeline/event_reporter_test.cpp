@@ -14,7 +14,7 @@ namespace {
 
 class EventReporterTest : public ::testing::Test {
  protected:
-  /// Fills the queue with contact changes nobody reads.
+  /// Fills the queue with contact changes that are not read.
   void fill() {
     while (exchange.events.room() > 0) ASSERT_TRUE(exchange.events.push(CommandDone{}));
   }
@@ -51,7 +51,7 @@ TEST_F(EventReporterTest, ReportsChangesOnly) {
   EXPECT_FALSE(std::get<ContactChanged>(next().value()).in_contact);
 }
 
-// A reference is being taken while something is held: nobody knows that it was lost.
+// A reference is being taken while an object is pressed in: the loss of contact is not known.
 TEST_F(EventReporterTest, AFrameThatWasNotMeasuredReportsNothingOfContact) {
   reporter.contact(frame(true, 1));
   ASSERT_TRUE(next());
@@ -103,7 +103,7 @@ TEST_F(EventReporterTest, BeyondTheLutIsReportedASecondLonger) {
   EXPECT_TRUE(std::get<StateChanged>(next().value()).health.empty());
 }
 
-// A client that was told that depth flows again asks for the status at once.
+// A client that receives "depth flows again" asks for the status at once.
 TEST_F(EventReporterTest, WhoHasReadTheEventReadsItInTheStatus) {
   constexpr int kChanges = 200;
   std::atomic<int> read{0};

@@ -11,7 +11,7 @@ namespace {
 using fakes::SteppedLoop;
 using fakes::toy_calibration;
 
-/// Past a reference and a second of quiet, at 60 frames a second.
+/// The watch after a reference and a second of quiet, at 60 frames a second.
 class ExposureWatchTest : public ::testing::Test {
  protected:
   ExposureWatchTest() {
@@ -26,7 +26,7 @@ class ExposureWatchTest : public ::testing::Test {
       loop_.step(1);
     }
   }
-  /// The light goes there as an exposure does, within a quarter of a second.
+  /// The light changes to `light` within a quarter of a second, like an exposure.
   void expose(double light) {
     for (int i = 0; i < 60; ++i) {
       loop_.camera.scene.light += 0.15 * (light - loop_.camera.scene.light);

@@ -23,15 +23,15 @@ struct Spots {
 };
 
 struct Picture {
-  double dx = 0;  ///< The gel's spots, moved; so far to the right …
+  double dx = 0;  ///< Shift of the gel's spots to the right …
   double dy = 0;  ///< … and down.
   double turn = 0;
   double light = 1;
   Spots gel{1, 400};
   Spots camera{2, 0};
-  double noise = 0.15;  ///< What an average of 32 frames leaves, grey levels.
+  double noise = 0.15;  ///< Of an average of 32 frames, grey levels.
   unsigned noise_seed = 3;
-  double stripes = 0;  ///< Of the camera, eight pixels apart.
+  double stripes = 0;  ///< Height of the camera's stripes, eight pixels apart.
 };
 
 GelMarks marks(const Picture& picture) {
@@ -72,7 +72,7 @@ GelMarks marks(const Picture& picture) {
   return {q8, kWidth, kPart};
 }
 
-/// Where they went; nowhere, which no test awaits, when it is not seen.
+/// The shift that is found; no shift, which no test expects, when it is not seen.
 GelMarks::Move found(const GelMarks& then, const Picture& now) {
   return then.moved_to(marks(now)).value_or(GelMarks::Move{});
 }
@@ -86,7 +86,7 @@ TEST(GelMarks, OfAStillSensorHaveNotMoved) {
   Picture dimmer = fresh();
   dimmer.light = 0.6;
   EXPECT_FALSE(then.moved_to(marks(dimmer)));
-  Picture warmer = fresh();  // as a housing that has grown warm
+  Picture warmer = fresh();  // like a housing that has warmed up
   warmer.dx = 0.3;
   warmer.dy = -0.2;
   EXPECT_FALSE(then.moved_to(marks(warmer)));
@@ -104,7 +104,7 @@ TEST(GelMarks, AreFoundWhereTheyWent) {
   }
 }
 
-// Marks three pixels wide are one-sided two pixels away by a fraction of a pixel already.
+// A shift of marks three pixels wide by a fraction of a pixel is already one-sided at two pixels.
 TEST(GelMarks, ThatWentAFractionOfAPixelHaveNotMoved) {
   const GelMarks before = marks({});
   for (const double dx : {0.5, -0.6}) {
@@ -138,7 +138,7 @@ TEST(GelMarks, AreFoundTurned) {
   }
 }
 
-TEST(GelMarks, ThatAreNotThereTellNothing) {
+TEST(GelMarks, ThatAreNotThereGiveNoShift) {
   const Picture blank{.gel = {1, 0}, .stripes = 0.5};
   Picture again = blank;
   again.noise_seed = 4;
@@ -151,7 +151,7 @@ TEST(GelMarks, ThatAreNotThereTellNothing) {
   EXPECT_FALSE(marks(even).moved_to(marks(even)));
 }
 
-TEST(GelMarks, OfTooSmallAPartTellNothing) {
+TEST(GelMarks, OfTooSmallAPartGiveNoShift) {
   const std::vector<std::uint16_t> q8(std::size_t{80} * 60, 150 * 256);
   const GelMarks small(q8, 80, {10, 5, 60, 50});
   EXPECT_FALSE(small.moved_to(small));

@@ -1,4 +1,4 @@
-// What the watchdog watches: the capture loop's heartbeat before a camera whose driver hangs.
+// The watchdog's input: the capture loop's heartbeat with a camera whose driver hangs.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -26,7 +26,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-/// A call of the driver that hangs when told to.
+/// A call of the driver that hangs on demand.
 class Gate {
  public:
   void shut() {
@@ -38,7 +38,7 @@ class Gate {
     shut_ = false;
     changed_.notify_all();
   }
-  /// What the driver's call does.
+  /// The body of the driver's call.
   void pass() {
     std::unique_lock lock(mutex_);
     waiting_ = shut_;
@@ -46,7 +46,7 @@ class Gate {
     changed_.wait(lock, [this] { return !shut_; });
     waiting_ = false;
   }
-  /// Until a call hangs; false after a generous deadline.
+  /// Waits until a call hangs; false after a generous deadline.
   [[nodiscard]] bool somebody_waits() {
     std::unique_lock lock(mutex_);
     return changed_.wait_for(lock, 30s, [this] { return waiting_; });
@@ -139,13 +139,13 @@ class Heartbeat : public ::testing::Test {
     if (!driver.attached) throw hal::live::DeviceError(hal::CameraState::unplugged, "plug it in");
     return {std::make_shared<DrivenSource>(driver), "driven", "GREY", {}};
   }
-  /// It moves, or does not, within half a second: five of the longest turns.
+  /// Whether it beats within half a second: five of the longest turns.
   [[nodiscard]] bool beats() const {
     const std::uint64_t before = pipeline->heartbeat();
     std::this_thread::sleep_for(500ms);
     return pipeline->heartbeat() != before;
   }
-  /// The call behind `gate` hangs, the heart stands still, the call returns, the heart goes on.
+  /// The call behind `gate` hangs, the heartbeat stops, the call returns, the heartbeat resumes.
   void hang(Gate& gate) {
     ASSERT_TRUE(gate.somebody_waits());
     EXPECT_FALSE(beats());

@@ -68,7 +68,7 @@ TEST_F(ImageWatchTest, PressOnAThirdIsNoDrift) {
   EXPECT_FALSE(has(Health::light_drifted));
 }
 
-// The bulge is highest beside the press; light is as bright everywhere.
+// The bulge is highest beside the press; a change of light is the same everywhere.
 TEST_F(ImageWatchTest, BulgeRoundAWidePressIsNoDriftButBrighterLightIs) {
   report_.active_cells = 80;
   const auto press = [&](double bulge, double light) {
@@ -120,7 +120,7 @@ TEST_F(ImageWatchTest, BandsMustLastSixFrames) {
   EXPECT_TRUE(watch_.health_flags().empty());
 }
 
-// However long they were there.
+// The same after bands of any length.
 TEST_F(ImageWatchTest, BandsAreOverSevenFramesAfterTheLast) {
   report_.frame.ripple = 0.6;
   for (int i = 0; i < 100; ++i) look();

@@ -26,7 +26,7 @@ class KeeperTest : public ::testing::Test {
     keeper.use_calibration(calibration->model->reference_q8, grid, region, same_light);
   }
 
-  /// Steps until something happens, at most `most` frames; what happened last stays in `last`.
+  /// Steps until an event, at most `most` frames; the last result stays in `last`.
   bool run(int most) {
     for (int i = 0; i < most; ++i) {
       last = keeper.step(ToyFrame(scene, sequence++).view());
@@ -34,17 +34,17 @@ class KeeperTest : public ::testing::Test {
     }
     return false;
   }
-  /// Grey levels by which the reference in use misses the reference image under the present light.
+  /// Largest error of the reference in use under the present light, grey levels.
   [[nodiscard]] double worst_error() const {
-    ToyScene untouched = scene;
-    untouched.press_mm = 0;
+    ToyScene no_contact = scene;
+    no_contact.press_mm = 0;
     double worst = 0;
     for (int y = 10; y < fakes::kToyHeight - 10; ++y) {
       for (int x = 10; x < fakes::kToyWidth - 10; ++x) {
         const std::size_t i =
             static_cast<std::size_t>(y) * fakes::kToyWidth + static_cast<std::size_t>(x);
         worst = std::max(
-            worst, std::abs(keeper.reference()[i] / 256.0 - fakes::toy_grey(untouched, x, y)));
+            worst, std::abs(keeper.reference()[i] / 256.0 - fakes::toy_grey(no_contact, x, y)));
       }
     }
     return worst;
@@ -97,7 +97,7 @@ TEST_F(KeeperTest, InContactAtStartUsesTheLastGoodOne) {
   EXPECT_EQ(keeper.quality(), ReferenceQuality::restored);
   EXPECT_FALSE(keeper.storable());
   EXPECT_LT(worst_error(), 1.0);
-  EXPECT_FALSE(run(100));  // as long as it touches nothing changes
+  EXPECT_FALSE(run(100));  // nothing changes during contact
   scene.press_mm = 0;
   ASSERT_TRUE(run(60));
   EXPECT_EQ(keeper.quality(), ReferenceQuality::fresh);
@@ -112,7 +112,7 @@ TEST_F(KeeperTest, InContactAtStartWithoutOneScalesTheCalibrations) {
   EXPECT_LT(worst_error(), 1.0);
 }
 
-// 0.016 of the field's light: other LEDs leave as much of their shape, a touch of 0.1 mm takes it.
+// 0.016 of the field's light: other LEDs leave as much of their shape; a contact of 0.1 mm has it.
 TEST_F(KeeperTest, UnderAnotherLightThanTheCalibrationsALittleShapeIsNoContact) {
   scene.press_mm = 0.1;
   calibrate(false);
@@ -183,7 +183,7 @@ TEST_F(KeeperTest, NoContactTwiceInARowEndsAFallback) {
   scene.press_mm = 1;
   ASSERT_TRUE(run(40));
   ASSERT_EQ(keeper.quality(), ReferenceQuality::stale);
-  // It looks every eighth frame.
+  // The keeper checks every eighth frame.
   ASSERT_FALSE(run(8));
   scene.press_mm = 0;
   ASSERT_FALSE(run(8));
@@ -216,7 +216,7 @@ TEST_F(KeeperTest, ForcedRezeroTakesTheImageInContactButDoesNotKeepIt) {
   EXPECT_EQ(last.answer, Outcome::done);
   EXPECT_TRUE(last.reference_changed);
   EXPECT_FALSE(keeper.storable());
-  // Lifted, the surface is brighter than its reference; re-zeroing then is no touch.
+  // After lifting, the surface is brighter than its reference; re-zeroing then is not contact.
   scene.press_mm = 0;
   EXPECT_EQ(keeper.rezero(false, false), std::nullopt);
   ASSERT_TRUE(run(40));

@@ -29,7 +29,7 @@ class LightDriverTest : public ::testing::Test {
     LightNote note;
     while (driver.next_note(note)) notes.push_back(note);
   }
-  /// The next event; waits for it.
+  /// Waits for the next event.
   std::optional<Event> next() {
     Event event;
     for (int i = 0; i < 5000; ++i) {
@@ -40,12 +40,12 @@ class LightDriverTest : public ::testing::Test {
     return std::nullopt;
   }
   template <typename Condition>
-  bool eventually(Condition flag) {
-    for (int i = 0; i < 1000 && !flag(); ++i) {
+  bool eventually(Condition condition) {
+    for (int i = 0; i < 1000 && !condition(); ++i) {
       take_notes();
       std::this_thread::sleep_for(std::chrono::milliseconds(10));
     }
-    return flag();
+    return condition();
   }
   std::vector<LightNote> notes;
   Exchange exchange{DepthFrame{}};
@@ -99,7 +99,7 @@ TEST_F(LightDriverTest, AFailureIsAnswerConditionAndSentence) {
   EXPECT_EQ(std::get<CommandDone>(*done).message, "the fake ring is broken: fix it");
   EXPECT_TRUE(driver.trouble());
   EXPECT_EQ(driver.message(), "the fake ring is broken: fix it");
-  EXPECT_EQ(driver.light().brightness, 200);  // what it still shows
+  EXPECT_EQ(driver.light().brightness, 200);  // the light that it still shows
   ring.broken = false;
   ASSERT_TRUE(driver.submit({SetLight{dimmed(100)}}));
   EXPECT_EQ(std::get<CommandDone>(next().value()).outcome, Outcome::done);
@@ -107,7 +107,7 @@ TEST_F(LightDriverTest, AFailureIsAnswerConditionAndSentence) {
   EXPECT_EQ(driver.message(), "");
   driver.stop();
   take_notes();
-  // At the start, then the light that failed and the one that still shone, then it again.
+  // At the start, then the light that failed, the one still shown, and the first again.
   std::vector<std::pair<bool, int>> reported;
   for (const LightNote& note : notes) reported.emplace_back(note.begins, note.light.brightness);
   EXPECT_EQ(reported,
@@ -156,7 +156,7 @@ TEST_F(LightDriverTest, WhatIsWorthKnowingOfTheRingIsReportedWhileNothingIsWrong
   EXPECT_EQ(driver.message(), "the fake ring is broken: fix it");
 }
 
-// It writes for nobody but us, so that its report says nothing of how it goes.
+// Only the next write shows whether the ring works, so its report says nothing of it.
 TEST_F(LightDriverTest, ARingThatNeverReSendsHealsByTheNextWriteAlone) {
   driver.start();
   ring.broken = true;
@@ -197,12 +197,12 @@ TEST_F(LightDriverTest, ALightAskedForWhileTheRingIsAwayIsShownWhenItComes) {
 
 TEST_F(LightDriverTest, ARingThatWentAndCameShowsItsLightAgain) {
   driver.start();
-  ring.broken = true;  // a write that fails first, as it does when the ring is on its way out
+  ring.broken = true;  // the last write fails before the ring is away
   ASSERT_TRUE(driver.submit({SetLight{dimmed(100)}}));
   ASSERT_TRUE(next());
   ring.away = true;
   EXPECT_TRUE(eventually([&] { return driver.message() == "the fake ring is away: plug it in"; }));
-  ring.away = false;  // it is found and does not work yet
+  ring.away = false;  // the ring is found but does not work yet
   EXPECT_TRUE(eventually([&] { return driver.message() == "the fake ring is broken: fix it"; }));
   ring.broken = false;
   EXPECT_TRUE(eventually([&] { return !driver.trouble(); }));
@@ -214,7 +214,7 @@ TEST_F(LightDriverTest, ARingThatWentAndCameShowsItsLightAgain) {
   EXPECT_TRUE(notes.back().returned);
 }
 
-// What a partial update builds on.
+// A partial update builds on this light.
 TEST_F(LightDriverTest, TheRequestedLightIsTheLastOneThatTheRingDidNotFailToShow) {
   EXPECT_EQ(driver.requested().brightness, 200);
   ASSERT_TRUE(driver.submit({SetLight{dimmed(10)}}));
@@ -244,7 +244,7 @@ TEST_F(LightDriverTest, StopsWhileItsQueuesAreFull) {
   for (int i = 0; i < 5000 && ring.all().size() < 8; ++i) {
     std::this_thread::sleep_for(std::chrono::milliseconds(1));
   }
-  std::this_thread::sleep_for(std::chrono::milliseconds(20));  // in which it tries four times
+  std::this_thread::sleep_for(std::chrono::milliseconds(20));  // it tries four times meanwhile
   EXPECT_EQ(ring.all().size(), 8U);
   driver.stop();
   take_notes();
@@ -254,8 +254,7 @@ TEST_F(LightDriverTest, StopsWhileItsQueuesAreFull) {
 TEST_F(LightDriverTest, ReportsSinceWhenFramesAreExposedUnderALight) {
   exchange.sequence = 41;
   driver.start();
-  EXPECT_EQ(driver.light_since_ns(), std::nullopt)
-      << "no frame yet: nobody knows how it is stamped";
+  EXPECT_EQ(driver.light_since_ns(), std::nullopt) << "no frame yet: its time stamps are unknown";
   exchange.light_lag_ns = 1000;
   take_notes();
   ASSERT_EQ(notes.size(), 2U);

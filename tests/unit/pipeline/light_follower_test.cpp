@@ -11,12 +11,12 @@ constexpr std::int64_t kFrameNs = 100'000'000;  // 10 frames a second
 constexpr int kSecond = 10;
 constexpr int kMinute = 600;
 
-/// Light as a share of the reference's, seen by a follower that is applied at once.
+/// The follower with light as a share of the reference's, applied at once.
 class LightFollowerTest : public ::testing::Test {
  protected:
-  void untouched(double light, int frames = 1) { see(light, LightSeen::From::all, frames); }
+  void no_contact(double light, int frames = 1) { see(light, LightSeen::From::all, frames); }
   void in_contact(double light, int frames) { see(light, LightSeen::From::nothing, frames); }
-  /// From the light of now, evenly.
+  /// Changes evenly from the present light.
   void drift(double to, int frames, LightSeen::From how = LightSeen::From::all) {
     const double from = light_;
     for (int i = 1; i <= frames; ++i) see(from + (to - from) * i / frames, how, 1);
@@ -40,7 +40,7 @@ class LightFollowerTest : public ::testing::Test {
 };
 
 TEST_F(LightFollowerTest, StaysAtOneWhileTheLightDoes) {
-  untouched(1, kMinute);
+  no_contact(1, kMinute);
   EXPECT_EQ(follower_.factor(), 1);
   EXPECT_FALSE(follower_.drifted());
 }
@@ -64,37 +64,37 @@ TEST_F(LightFollowerTest, EndsAtTheLimitAndReports) {
 }
 
 TEST_F(LightFollowerTest, AStepIsReportedAndNeverFollowed) {
-  untouched(1, kMinute);
-  untouched(0.995, 2);
+  no_contact(1, kMinute);
+  no_contact(0.995, 2);
   EXPECT_FALSE(follower_.drifted()) << "a single odd frame says nothing";
-  untouched(0.995);
+  no_contact(0.995);
   EXPECT_TRUE(follower_.drifted());
-  untouched(0.995, 10 * kMinute);
+  no_contact(0.995, 10 * kMinute);
   EXPECT_EQ(follower_.factor(), 1);
   EXPECT_NEAR(follower_.left(), -0.005, 1e-9);
-  untouched(1, 3);
+  no_contact(1, 3);
   EXPECT_FALSE(follower_.drifted());
 }
 
 TEST_F(LightFollowerTest, DriftFasterThanTheRateIsReported) {
-  untouched(1, kMinute);
+  no_contact(1, kMinute);
   drift(0.96, kMinute);
   EXPECT_GT(follower_.factor(), 0.98);
   EXPECT_TRUE(follower_.drifted());
 }
 
 TEST_F(LightFollowerTest, CatchesUpAfterALongPress) {
-  untouched(1, kMinute);
+  no_contact(1, kMinute);
   drift(0.99, kMinute, LightSeen::From::nothing);
   EXPECT_EQ(follower_.factor(), 1);
-  untouched(0.99, kSecond - 1);
+  no_contact(0.99, kSecond - 1);
   EXPECT_EQ(follower_.factor(), 1) << "waits a second";
-  untouched(0.99, 2);
+  no_contact(0.99, 2);
   EXPECT_NEAR(follower_.factor(), 0.99, 0.0001);
 }
 
 TEST_F(LightFollowerTest, StatesHowFarTheLightMayHaveMovedOutOfSight) {
-  untouched(1, kMinute);
+  no_contact(1, kMinute);
   EXPECT_EQ(follower_.unseen(), 0);
   in_contact(1, 3 * kSecond);
   EXPECT_EQ(follower_.unseen(), 0) << "between two looks beside a press";
@@ -102,19 +102,19 @@ TEST_F(LightFollowerTest, StatesHowFarTheLightMayHaveMovedOutOfSight) {
   EXPECT_NEAR(follower_.unseen(), 0.005, 1e-9) << "half of 2 % a minute";
   in_contact(1, 5 * kMinute);
   EXPECT_NEAR(follower_.unseen(), 0.01, 1e-9) << "half of the limit";
-  untouched(1);
+  no_contact(1);
   EXPECT_EQ(follower_.unseen(), 0);
 }
 
 TEST_F(LightFollowerTest, FollowsBesideAPressWhatTheRestShows) {
-  untouched(1, kMinute);
+  no_contact(1, kMinute);
   drift(0.994, 2 * kMinute, LightSeen::From::quiet);
   EXPECT_NEAR(follower_.factor(), 0.994, 0.0005);
   EXPECT_FALSE(follower_.drifted());
 }
 
 TEST_F(LightFollowerTest, WaitsASecondWhenTheLightIsSeenAnotherWay) {
-  untouched(1, kMinute);
+  no_contact(1, kMinute);
   see(0.999, LightSeen::From::quiet, kSecond);
   EXPECT_EQ(follower_.factor(), 1);
   see(0.999, LightSeen::From::quiet, 3);  // 1.3 s at 2 % a minute
@@ -122,7 +122,7 @@ TEST_F(LightFollowerTest, WaitsASecondWhenTheLightIsSeenAnotherWay) {
 }
 
 TEST_F(LightFollowerTest, AStepThatComesWithAPressIsReportedAndNotFollowed) {
-  untouched(1, kMinute);
+  no_contact(1, kMinute);
   see(0.99, LightSeen::From::quiet, kMinute);
   EXPECT_EQ(follower_.factor(), 1);
   EXPECT_NEAR(follower_.left(), -0.01, 1e-9);
@@ -130,27 +130,27 @@ TEST_F(LightFollowerTest, AStepThatComesWithAPressIsReportedAndNotFollowed) {
 }
 
 TEST_F(LightFollowerTest, AShortPressAllowsNoStep) {
-  untouched(1, kMinute);
+  no_contact(1, kMinute);
   in_contact(1, 2 * kSecond);
-  untouched(0.99, 10 * kMinute);
+  no_contact(0.99, 10 * kMinute);
   EXPECT_EQ(follower_.factor(), 1);
   EXPECT_TRUE(follower_.drifted());
 }
 
 TEST_F(LightFollowerTest, WhatWasNotFollowedIsNotAllowedForLater) {
-  untouched(1, kMinute);
-  untouched(0.99, kSecond);
+  no_contact(1, kMinute);
+  no_contact(0.99, kSecond);
   for (int i = 0; i < 60; ++i) {  // a flat press that moves a little
     in_contact(0.99, 9);
-    untouched(0.99);
+    no_contact(0.99);
   }
-  untouched(0.99, kMinute);
+  no_contact(0.99, kMinute);
   EXPECT_EQ(follower_.factor(), 1);
 }
 
 TEST_F(LightFollowerTest, ANewReferenceBeginsAnew) {
   drift(0.99, kMinute);
-  untouched(0.95, kSecond);
+  no_contact(0.95, kSecond);
   follower_.restart();
   EXPECT_EQ(follower_.factor(), 1);
   EXPECT_EQ(follower_.left(), 0);

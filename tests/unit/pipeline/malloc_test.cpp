@@ -23,7 +23,7 @@
 namespace dtact::pipeline {
 namespace {
 
-/// JPEGs of the toy sensor, the last few of `count` pressed.
+/// JPEGs of the toy sensor; the last few of `count` are pressed.
 std::vector<std::vector<std::uint8_t>> payloads(int count) {
   std::vector<std::vector<std::uint8_t>> made;
   for (int i = 0; i < count; ++i) {
@@ -45,14 +45,14 @@ std::array<long, 2> faults() {
   return {usage.ru_minflt, usage.ru_majflt};
 }
 
-/// A pipeline on a camera of JPEGs, and the network thread's part: frames fetched, events read, and
-/// a re-zero, a light command and another calibration at every `kEvery`-th frame after the first,
-/// so that the capture thread does all that it does in a long life.
+/// A pipeline on a camera of JPEGs. The test plays the network thread: it fetches frames, reads
+/// events, and sends a re-zero, a light command and another calibration at every `kEvery`-th frame
+/// after the first, so that the capture thread does all of its work.
 class CaptureThread : public ::testing::Test {
  protected:
   static constexpr std::uint64_t kEvery = 150;
 
-  /// `on_grab`: on the capture thread, before each frame, with the number delivered so far.
+  /// Calls `on_grab` on the capture thread before each frame, with the number delivered so far.
   void run(std::uint64_t frames, const std::function<void(std::uint64_t)>& on_grab,
            const ReconstructionRules& rules = {}) {
     std::atomic<std::uint64_t> grabbed{0};
@@ -117,7 +117,7 @@ class CaptureThread : public ::testing::Test {
   bool depth_ = false;
 };
 
-/// On from the hundredth frame until shortly before the thread's end, which frees what was its own.
+/// Counts from the hundredth frame until shortly before the thread's end, which frees its own data.
 std::function<void(std::uint64_t)> counting(std::uint64_t frames) {
   return [frames](std::uint64_t delivered) {
     if (delivered == 100) fakes::count_allocations(true);
@@ -125,7 +125,7 @@ std::function<void(std::uint64_t)> counting(std::uint64_t frames) {
   };
 }
 
-// Two calibrations long.
+// The run is two calibrations long.
 TEST_F(CaptureThread, AllocatesAndFreesNothingAfterItsFirstHundredFrames) {
   if (!fakes::can_count_allocations()) GTEST_SKIP() << "the sanitizer brings its own malloc";
   run(1400, counting(1400));
@@ -134,7 +134,7 @@ TEST_F(CaptureThread, AllocatesAndFreesNothingAfterItsFirstHundredFrames) {
 
 TEST_F(CaptureThread, AllocatesAndFreesNothingWhileItSharpensMoreAndLess) {
   if (!fakes::can_count_allocations()) GTEST_SKIP() << "the sanitizer brings its own malloc";
-  // The plain list is taken for 50 um: the first frames are plain, the pressed ones sharpened.
+  // The plain LUT counts as 50 um: the first frames are plain, the pressed ones sharpened.
   run(600, counting(600), {.sharpen = ReconstructionRules::kAutoSharpen, .max_error_um = 55});
   EXPECT_EQ(fakes::counted_allocations(), 0U);
 }

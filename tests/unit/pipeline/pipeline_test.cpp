@@ -24,7 +24,7 @@ TEST_F(PipelineTest, ServesDepthAfterItsSequence) {
   EXPECT_FALSE(frame->contact.in_contact);
   // CLOCK_REALTIME of the same moment: within a second of now.
   EXPECT_LT(std::abs(base::system_clock().wall_ns() - frame->wall_ns), 1'000'000'000);
-  // A frame is published before what it changed is told.
+  // A frame is published before the event of the change.
   ASSERT_TRUE(until([&] {
     const auto reported = all<StateChanged>();
     return !reported.empty() && reported.back().state == State::serving &&
@@ -49,7 +49,7 @@ TEST_F(PipelineTest, SaysWhichCpuTheCaptureThreadIsPinnedTo) {
   EXPECT_EQ(pipeline->status().cpu, std::nullopt);
 }
 
-// A picture that never holds still is refused after timeout_frames in each of two phases.
+// A picture that never stands still is refused after timeout_frames in each of two phases.
 TEST_F(PipelineTest, SaysHowLongARezeroMayTake) {
   config.reference.timeout_frames = 90;
   build(fakes::toy_calibration());
@@ -109,7 +109,7 @@ TEST_F(PipelineTest, ASharpenedMapSaysHowItWasMade) {
   EXPECT_NEAR(frame->contact.deepest_mm, 1.38, 0.03);
   EXPECT_NEAR(frame->contact.x_mm, 0.1, 0.1);
   EXPECT_NEAR(frame->contact.y_mm, 0.1, 0.1);
-  // The finer map's pixels lie an eighth of a coarse one beside its middle, at least.
+  // The finer map's pixels are at least an eighth of a coarse one beside its middle.
   const int max_um = *std::ranges::max_element(frame->depth_um);
   EXPECT_LE(max_um, 1000 * frame->contact.deepest_mm + 0.5);
   EXPECT_GE(max_um, 970 * frame->contact.deepest_mm);
@@ -129,7 +129,7 @@ TEST_F(PipelineTest, ASharpenedMapMayStayCoarse) {
 TEST_F(PipelineTest, AutoSharpensAsMuchAsTheBoundAsksFor) {
   config.reconstruction.sharpen = ReconstructionRules::kAutoSharpen;
   config.reconstruction.decimation = 0;
-  config.reconstruction.max_error_um = 40;  // the plain list is taken for 50
+  config.reconstruction.max_error_um = 40;  // the plain LUT counts as 50
   start(fakes::scattering_toy_calibration(15));
   ASSERT_TRUE(until_frame([](const DepthFrame& f) { return f.has_depth && f.sharpen_steps == 1; }));
   EXPECT_EQ(frame->decimation, 4);
@@ -151,7 +151,7 @@ TEST_F(PipelineTest, AutoTakesTheCoarsestMapWithinTheBound) {
   start(fakes::toy_calibration());
   ASSERT_TRUE(until_frame([](const DepthFrame& f) { return f.has_depth && f.decimation == 4; }));
   EXPECT_EQ(frame->width, 36);
-  EXPECT_NEAR(frame->uncertainty_um, 50, 1);  // a list that says nothing of itself, nothing pressed
+  EXPECT_NEAR(frame->uncertainty_um, 50, 1);  // a LUT without a stated uncertainty, no press
   camera.press(1);
   ASSERT_TRUE(until_frame([](const DepthFrame& f) { return f.contact.in_contact; }));
   EXPECT_GT(frame->uncertainty_um, 50);
@@ -228,7 +228,7 @@ TEST_F(PipelineTest, HalvedLightReadsTheSameDepthAfterANewReference) {
   ASSERT_TRUE(until_fresh());
   EXPECT_EQ(ask(SetLight{dimmed(128)}).outcome, Outcome::done);
   ASSERT_TRUE(until_frame([](const DepthFrame& f) { return f.has_depth; }));
-  // A calibration under full light, so that much stays to be said.
+  // The calibration is under full light, so that this flag remains.
   EXPECT_TRUE(frame->health.has(Health::light_mismatch));
   EXPECT_FALSE(frame->health.has(Health::reference_stale));
   EXPECT_EQ(frame->light.brightness, 128);
@@ -296,7 +296,7 @@ TEST_F(PipelineTest, ABrokenRingIsAConditionNotTheEnd) {
   EXPECT_EQ(pipeline->status().ring_message, "the fake ring is broken: fix it");
 }
 
-// What was averaged before it came is no reference for its light, though that is the one asked for.
+// Frames averaged before the ring came are no reference for its light, though it was requested.
 TEST_F(PipelineTest, ARingThatComesLaterBeginsTheReferenceAnew) {
   ring.away = true;
   camera.light(0.5);  // the room's
@@ -351,7 +351,7 @@ TEST_F(PipelineTest, DepthIsMadeInAnotherWayAgainstTheSameReference) {
   EXPECT_EQ(frame->width, full / 4);
   EXPECT_TRUE(frame->health.empty());
   EXPECT_EQ(pipeline->status().reconstruction.decimation, 4);
-  // Also of calibrations to come.
+  // The same holds for later calibrations.
   EXPECT_EQ(use(fakes::toy_calibration()).outcome, Outcome::done);
   EXPECT_TRUE(until_frame([](const DepthFrame& f) { return f.has_depth; }));
   EXPECT_EQ(frame->decimation, 4);
@@ -385,7 +385,7 @@ TEST_F(PipelineTest, ACalibrationOfAnotherModeIsRefused) {
   ASSERT_TRUE(until_fresh());
   EXPECT_EQ(pipeline->status().calibration->name, "toy");
   pipeline.reset();
-  // At start the same is a condition: luma flows.
+  // The same at start is a health flag: luma flows.
   start(other);
   ASSERT_TRUE(until_state(State::uncalibrated));
   EXPECT_TRUE(pipeline->status().health.has(Health::camera_mismatch));

@@ -1,4 +1,4 @@
-// The whole pipeline when something is wrong, late or refused, what it tells, and how it stops.
+// The whole pipeline under faults, delays and refusals: what it reports and how it stops.
 #include <gtest/gtest.h>
 
 #include <chrono>
@@ -49,7 +49,7 @@ TEST_F(PipelineTest, LostAndDamagedFramesAreAConditionForASecond) {
 TEST_F(PipelineTest, DeeperThanTheLutIsACondition) {
   start(fakes::toy_calibration());
   ASSERT_TRUE(until_fresh());
-  camera.press(3);  // the list ends at 70 grey levels, 2.2 mm
+  camera.press(3);  // the LUT ends at 70 grey levels, 2.2 mm
   ASSERT_TRUE(
       until_frame([](const DepthFrame& f) { return f.health.has(Health::beyond_calibration); }));
   EXPECT_LT(frame->contact.deepest_mm, 2.3);
@@ -58,7 +58,7 @@ TEST_F(PipelineTest, DeeperThanTheLutIsACondition) {
 TEST_F(PipelineTest, AFullEventQueueLosesNoAnswerAndNoState) {
   start(fakes::toy_calibration());
   ASSERT_TRUE(until_fresh());
-  // Nobody reads events while contact comes and goes more often than the queue is long, 64.
+  // Events stay unread while contact comes and goes more often than the queue is long, 64.
   const auto shown = [&](bool in_contact) {
     for (int i = 0; i < 5000; ++i) {
       const DepthFrame* newest = pipeline->latest();
@@ -122,7 +122,7 @@ TEST_F(PipelineTest, StatusHasStagesAndRate) {
   const Status status = pipeline->status();
   ASSERT_EQ(status.stages.size(), 8U);
   EXPECT_EQ(status.stages[3].stage, "smooth");
-  // There is no contact, so nothing is smoothed; the look at the frame takes its time all the same.
+  // There is no contact, so nothing is smoothed; the check of the frame takes its time anyway.
   EXPECT_EQ(status.stages[1].stage, "activity");
   EXPECT_GT(status.stages[1].p50_us, 0);
   EXPECT_EQ(status.stages[7].stage, "total");
@@ -141,7 +141,7 @@ TEST_F(PipelineTest, RefusedRealTimeIsSaidAndSurvived) {
   const Status status = pipeline->status();
   ASSERT_FALSE(status.realtime.empty());
   EXPECT_NE(status.realtime[0].find("CPU 1000"), std::string::npos);
-  // Whether FIFO is granted depends on who runs the test; the condition follows the sentence.
+  // Whether FIFO is granted depends on the user of the test; the flag follows the sentence.
   EXPECT_EQ(status.health.has(Health::not_realtime), status.realtime.size() == 2);
 }
 
@@ -154,7 +154,7 @@ TEST_F(PipelineTest, StopsWhileTheCameraIsSilent) {
   pipeline->stop();
   // 0.1 s by design; the margin is for a busy machine.
   EXPECT_LT(std::chrono::steady_clock::now() - began, std::chrono::seconds(5));
-  EXPECT_EQ(camera.lent, 0);  // the last frame went home
+  EXPECT_EQ(camera.lent, 0);  // the last frame was released
 }
 
 TEST_F(PipelineTest, StopsWithoutHavingStarted) {

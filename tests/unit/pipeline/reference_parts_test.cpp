@@ -110,7 +110,7 @@ TEST_F(ContactCheckTest, LightIsNoContact) {
 }
 
 TEST_F(ContactCheckTest, APressIsAContactUnderAnyLight) {
-  // 31.25 of about 150 grey levels a millimetre, less what the cells average away.
+  // 31.25 of about 150 grey levels a millimetre, less the averaging over cells.
   EXPECT_NEAR(darkening({.press_mm = 1}), 0.2, 0.03);
   EXPECT_NEAR(darkening({.light = 0.5, .press_mm = 1}), 0.2, 0.03);
   EXPECT_GT(darkening({.light = 0.8, .tilt = -0.3, .press_mm = 0.15}), 0.02F);
@@ -195,7 +195,7 @@ TEST_P(RealTouch, IsReportedFromDrift) {
   if (pair.in_contact) {
     EXPECT_GT(verdict.darkening, 0.04F);
   } else {
-    EXPECT_LT(verdict.darkening, 0.0063F);  // half of what counts as a touch
+    EXPECT_LT(verdict.darkening, 0.0063F);  // half of the limit of contact
     EXPECT_GT(verdict.explained, 0.9F);
   }
 }

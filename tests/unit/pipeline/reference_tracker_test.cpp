@@ -54,7 +54,7 @@ class ReferenceTrackerTest : public ::testing::Test {
   void show(int frames) {
     for (int i = 0; i < frames; ++i) (void)look(next());
   }
-  /// Whether depth can be measured after so many frames, and with nothing to complain of.
+  /// Whether depth can be measured after three times the reference's frames, without a health flag.
   bool settles() {
     show(3 * kReferenceFrames);
     return image_.quality() == ReferenceQuality::fresh && image_.health_flags().empty();
@@ -105,7 +105,7 @@ TEST_F(ReferenceTrackerTest, TheLightThatIsFollowedOutlivesTheCalibration) {
   EXPECT_FALSE(image_.any_active());
 }
 
-// What is held drags the gel along, and its marks with it.
+// An object in contact drags the gel along, and its marks with it.
 TEST_F(ReferenceTrackerTest, TheCamerasShiftIsNotJudgedByAGelInContact) {
   ASSERT_TRUE(settles());
   now_ns_ += CameraShiftDetector::kPauseNs;
@@ -145,7 +145,7 @@ TEST_F(ReferenceTrackerTest, AReferenceForcedInContactIsNotKeptForTheNextStart) 
   EXPECT_NEAR(kept->image_q8[kMiddle], 150 * 256, 3 * 256);
 }
 
-// The ring writes again what it shows, say, and flickers.
+// For example, the ring re-sends its light and flickers.
 TEST_F(ReferenceTrackerTest, NoDepthIsMeasuredBeforeTheLightHasSettled) {
   ASSERT_TRUE(settles());
   EXPECT_TRUE(look(next()).measurable);
@@ -154,7 +154,7 @@ TEST_F(ReferenceTrackerTest, NoDepthIsMeasuredBeforeTheLightHasSettled) {
   EXPECT_TRUE(look(next()).measurable);
 }
 
-// The ring has no power, say. A camera's first pictures may be dark.
+// For example, the ring has no power. A camera's first pictures may be dark.
 TEST_F(ReferenceTrackerTest, ReportsADarkPictureBeforeTheFirstReference) {
   scene_.light = 0.04;  // 6 levels
   show(config_.reference.settle_frames - 1);

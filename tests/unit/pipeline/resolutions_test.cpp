@@ -19,7 +19,7 @@ using testing::HasSubstr;
 using Calibration = std::shared_ptr<const calibration::Calibration>;
 
 struct MapVariant {
-  int made = 0;  ///< 1/made of the resolution, …
+  int made = 0;  ///< Computed at 1/made of the full resolution, …
   int steps = 0;
   int map = 0;  ///< … interpolated to 1/map.
   bool operator==(const MapVariant&) const = default;
@@ -40,7 +40,7 @@ std::vector<MapVariant> resolutions(const Calibration& calibration, int method, 
   return all;
 }
 
-/// The toy whose light is scattered farther than the filter reaches.
+/// The toy with light that scatters farther than the filter reaches.
 Calibration too_wide() {
   auto made = fakes::scattering_toy_calibration(15);
   recon::Model model = *made->model;
@@ -98,7 +98,7 @@ TEST(Resolutions, CountTheLightOfTheMapAlone) {
     model.reference_q8[static_cast<std::size_t>(at.y) * fakes::kToyWidth +
                        static_cast<std::size_t>(at.x)] = 100 * 256;
   }
-  // A dark corner of the map is no part of it either.
+  // A dark corner of the map is left out as well.
   for (std::size_t i = 0; i < 20; ++i) {
     const recon::RectifyTable::Entry& at = model.rectify.entries[i];
     model.reference_q8[static_cast<std::size_t>(at.y) * fakes::kToyWidth +

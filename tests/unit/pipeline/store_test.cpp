@@ -100,7 +100,7 @@ TEST_F(StoreTest, TheWriterWritesBehind) {
   ReferenceWriter writer(fakes::kToyWidth, fakes::kToyHeight, folder, thread);
   thread.start();
   EXPECT_TRUE(writer.offer(fakes::toy_reference_q8(), {}, calibration));
-  thread.stop();  // writes what was offered
+  thread.stop();  // writes the offered reference
   EXPECT_EQ(writer.message(), "");
   ASSERT_TRUE(load());
   EXPECT_EQ(calibration.use_count(), 1);

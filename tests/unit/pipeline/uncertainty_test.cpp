@@ -88,7 +88,7 @@ TEST(Uncertainty, AddsLutAndBlurInSquares) {
   EXPECT_DOUBLE_EQ(uncertainty_at_um(28, 3, 4), 35.93);
 }
 
-/// What a list is uncertain by at 0.5 mm after a change to its model.
+/// The uncertainty of a LUT at 0.5 mm after a change to its model.
 template <typename Change>
 double lut_um(Change change) {
   const auto calibration = fakes::toy_calibration();
@@ -117,7 +117,7 @@ TEST(LutUncertainty, OfACalibrationThatDoesNotSayIsWhatTheTableMeasured) {
   EXPECT_EQ(lut_um([](recon::Model& m) { m.gain.shape = recon::GainShape::radial; }), 118);
 }
 
-/// The ladder of plain resolutions, by what a frame's list and bend are expected to cost on each.
+/// The ladder of plain resolutions, chosen by a frame's expected error from its LUT and bend.
 class LadderChooser {
  public:
   int next(double lut_um, double bend_um) {

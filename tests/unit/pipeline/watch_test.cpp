@@ -36,7 +36,7 @@ TEST(CameraWatch, AGapIsRememberedForASecond) {
   EXPECT_FALSE(watch.lost_lately(1100 * kMs));
 }
 
-// The camera says what it lost; a frame that was passed over for a newer one is another thing.
+// The camera reports its losses; a frame that was skipped for a newer one is not a loss.
 TEST(CameraWatch, ASkippedFrameIsNoLoss) {
   CameraWatch watch(kPeriod);
   (void)watch.arrived(numbered(5), 0);
@@ -103,7 +103,7 @@ TEST(CameraWatch, ReturningIsReportedOnceAndIsNoGap) {
   EXPECT_FALSE(watch.arrived(numbered(901), 3 * kPeriod));
 }
 
-/// `frames` frames, `ns` after one another.
+/// Adds `frames` frames at intervals of `ns`.
 void add_frames(RateWatch& watch, hal::FrameInfo& info, int frames, std::int64_t ns) {
   for (int i = 0; i < frames; ++i) {
     ++info.sequence;
@@ -240,7 +240,7 @@ TEST(LightDiffers, ComparesAfterBrightness) {
   const auto calibration = fakes::toy_calibration();  // full white
   hal::Light light;
   EXPECT_FALSE(light_differs(*calibration, light));
-  light.brightness = 254;  // one step: not worth a word
+  light.brightness = 254;  // one step: not reported
   EXPECT_FALSE(light_differs(*calibration, light));
   light.brightness = 253;
   EXPECT_TRUE(light_differs(*calibration, light));

@@ -23,7 +23,7 @@
 
 namespace dtact::pipeline {
 
-/// The whole pipeline before a toy sensor whose ring lights it. The test is the network thread.
+/// The whole pipeline on a toy sensor lit by its ring. The test is the network thread.
 class PipelineTest : public ::testing::Test {
  protected:
   PipelineTest() {
@@ -53,7 +53,7 @@ class PipelineTest : public ::testing::Test {
     pipeline->start();
   }
 
-  /// Fetches what comes until `done` says so; false after a generous deadline.
+  /// Fetches frames and events until `done` returns true; false after a generous deadline.
   bool until(const std::function<bool()>& done) {
     const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(30);
     while (std::chrono::steady_clock::now() < deadline) {
@@ -75,7 +75,7 @@ class PipelineTest : public ::testing::Test {
   bool until_state(State state) {
     return until([&] { return pipeline->status().state == state; });
   }
-  /// Serving, with a frame that was exposed after this call.
+  /// Waits for a frame that was exposed after this call and meets the predicate, while serving.
   bool until_frame(const std::function<bool(const DepthFrame&)>& like) {
     const std::int64_t from = base::system_clock().monotonic_ns();
     return until(
@@ -98,7 +98,7 @@ class PipelineTest : public ::testing::Test {
   CommandDone reconstruct(const ReconstructionRules& rules) {
     return ask(pipeline->prepare_maps(pipeline->status().calibration, rules));
   }
-  /// The sentence of the refusal; empty: there was none.
+  /// The message of the refusal; empty: it was accepted.
   static std::string refusal(const std::function<void()>& prepare) {
     try {
       prepare();

@@ -142,7 +142,7 @@ class Aio(unittest.IsolatedAsyncioTestCase):
             async with dtact.aio.connect(daemon.address, reconnect=True) as s:
                 await s.subscribe()
                 answer = threading.Event()
-                # A daemon that takes longer than those who wait.
+                # The daemon takes longer than the callers wait.
                 def late(request, reply):
                     answer.wait(10)
                     reply.hello.major, reply.hello.program = 1, "late"

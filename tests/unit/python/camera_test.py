@@ -82,7 +82,7 @@ class Reading(unittest.TestCase):
         camera = self.camera()
         picture = camera.read_latest(10_000)
         self.assertEqual((picture.shape, picture.dtype), ((2, 2, 3), np.uint8))
-        # Untouched, 1 mm of 2, not to be believed, hardly pressed.
+        # No contact, 1 mm of 2, not to be trusted, hardly pressed.
         self.assertEqual(picture.tolist(), [[[0, 0, 0], [182, 55, 121]], [[0, 0, 0], [4, 1, 6]]])
 
     def test_connect_completes_what_was_left_out(self):
@@ -152,7 +152,7 @@ class Reading(unittest.TestCase):
     def test_async_read_gives_each_frame_once(self):
         camera = self.camera()
         camera.async_read(10_000)
-        camera.async_read_depth(10_000)  # It counts for itself.
+        camera.async_read_depth(10_000)  # It has its own position.
         with self.assertRaises(TimeoutError):
             camera.async_read(timeout_ms=50)
         self.daemon.push(frame(2))
@@ -238,7 +238,7 @@ class Reading(unittest.TestCase):
         self.enterContext(mock.patch.dict(os.environ, {"PATH": f"{folder}:/usr/bin:/bin"}))
         with mock.patch("dtact.camera.Client", lambda **_: dtact.Client(self.daemon.address)):
             self.assertEqual(dtact.Camera.find_cameras(), [here])
-        # As dtactctl find prints it.
+        # The output format of dtactctl find.
         program = pathlib.Path(folder, "dtactctl")
         program.write_text("""#!/bin/sh
 [ "$*" = "find --json --seconds 1" ] || exit 2
@@ -250,8 +250,8 @@ echo '{"name":"b","address":"fe80::1","port":7378}'
             self.assertEqual(dtact.Camera.find_cameras(), [
                 {"name": "a", "type": "dtact", "id": "192.0.2.7:7377", "serial": "S1"},
                 {"name": "b", "type": "dtact", "id": "[fe80::1]:7378", "serial": ""}])
-        program.write_text("#!/bin/sh\necho dtactctl: nobody >&2; exit 4\n")
-        with mock.patch("dtact.camera.Client", side_effect=dtact.ConnectionError("nobody")):
+        program.write_text("#!/bin/sh\necho dtactctl: none >&2; exit 4\n")
+        with mock.patch("dtact.camera.Client", side_effect=dtact.ConnectionError("none")):
             self.assertEqual(dtact.Camera.find_cameras(), [])
 
 
@@ -273,7 +273,7 @@ class LeRobotErrors:
 
 
 class Plugin(unittest.TestCase):
-    """lerobot_camera_dtact on a stand-in of the parts of LeRobot that it touches."""
+    """lerobot_camera_dtact on a stand-in of the parts of LeRobot that it uses."""
 
     def setUp(self):
         @dataclass(kw_only=True)

@@ -1,4 +1,4 @@
-"""The client that waits, when the connection ends."""
+"""The blocking client when the connection ends."""
 import os
 import tempfile
 import time
@@ -57,7 +57,7 @@ class Breaking(unittest.TestCase):
             daemon.drop()
             time.sleep(0.1)
             with self.assertRaises(dtact.ConnectionError):
-                s.set_light(brightness=1)  # It was under way: nobody knows whether it was done.
+                s.set_light(brightness=1)  # It was under way: it may have been done or not.
             self.assertEqual(s.set_light(brightness=1).brightness, 1)
 
     def test_waits_for_a_daemon_that_comes_back(self):

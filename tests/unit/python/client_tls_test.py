@@ -1,4 +1,4 @@
-"""The client that waits, to a daemon that it knows by its certificate."""
+"""The blocking client with a daemon that it knows by its certificate."""
 import tempfile
 import unittest
 from unittest import mock

@@ -1,4 +1,4 @@
-"""A daemon on a thread that answers as a test tells it to."""
+"""A daemon on a thread that answers as the test prescribes."""
 import contextlib
 import socket
 import threading
@@ -42,7 +42,7 @@ class FakeDaemon:
         self.pushed = []
         self.answers = {}  # request kind → function (request, Reply message); False: no answer
         self.connections = 0
-        self.ended = 0  # Of the connections.
+        self.ended = 0  # Number of connections that ended.
         self._connection = None
         if path:
             self._socket = socket.socket(socket.AF_UNIX)
@@ -66,7 +66,7 @@ class FakeDaemon:
         self._socket.close()
 
     def drop(self):
-        """Ends the present connection."""
+        """Ends the current connection."""
         connection = self._connection
         if connection is not None:
             try:

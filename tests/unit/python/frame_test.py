@@ -1,4 +1,4 @@
-"""What a frame holds, and what it says of what it does not hold."""
+"""Contents of a frame, and the errors for parts that it lacks."""
 import datetime
 import unittest
 

@@ -1,4 +1,4 @@
-"""Points and motion of an object, as dtact-perceive sends them."""
+"""Points and motion of an object, in dtact-perceive's messages."""
 import struct
 import unittest
 

@@ -1,4 +1,4 @@
-"""Recordings, written here by the letter of https://mcap.dev/spec."""
+"""Recordings that the test writes after https://mcap.dev/spec."""
 import os
 import pathlib
 import struct

@@ -1,4 +1,4 @@
-"""The schema in the package is the tree's, and both ways of protobuf make messages of it."""
+"""The schema in the package is the tree's, and both implementations of protobuf read it."""
 import os
 import pathlib
 import subprocess

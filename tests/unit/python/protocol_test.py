@@ -1,4 +1,4 @@
-"""The conversation, without any connection."""
+"""The protocol without a connection."""
 import unittest
 
 import dtact

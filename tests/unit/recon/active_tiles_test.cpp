@@ -39,7 +39,7 @@ Model make_model() {
   return model;
 }
 
-/// The whole of run_active against the specification, on every instruction set.
+/// Compares all of run_active with the specification, on every instruction set.
 class ActiveTiles : public EveryTarget {
  protected:
   static void expect_the_full_result(int steps);
@@ -58,7 +58,7 @@ void ActiveTiles::expect_the_full_result(int steps) {
   Reconstructor reconstructor(model, steps);
   Specification specification(*model, steps);
   const TileGrid& grid = reconstructor.grid();
-  // Two buffers, as a frame pool has, in unequal turns.
+  // Two buffers in unequal turns, like a frame pool's.
   std::vector<std::int16_t> depth[2];
   DrawnTiles drawn[2];
   for (auto& buffer : depth) buffer.assign(model->rectify.entries.size(), 12345);
@@ -91,7 +91,7 @@ void ActiveTiles::expect_the_full_result(int steps) {
       row &= random();
     }
     if (i % 10 == 0) std::ranges::fill(tiles, i % 20 == 0 ? grid.all() : 0);
-    // A few beside each other: a filter then reads less than everything.
+    // A few adjacent tiles: a filter then reads only part of the map.
     if (i % 3 == 0) {
       const std::uint64_t mask = (random() % 3 + 1) << (random() % 6);
       const std::size_t row = random() % tiles.size();

@@ -73,7 +73,7 @@ TEST(Decimate, APixelIsTheMeanOfItsArea) {
 }
 
 TEST(Decimate, NothingAliases) {
-  // The finest stripes there are, in either direction: a coarse map that picked pixels would show
+  // The finest possible stripes, in either direction: a coarse map that picked pixels would show
   // all of them or none.
   for (const int factor : {2, 4}) {
     for (const std::int16_t um : run(decimate(straight_model(), factor),

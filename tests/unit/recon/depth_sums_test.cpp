@@ -1,5 +1,5 @@
-// What a map adds up to: the scalar kernels at literal expectations, every instruction set against
-// them, and whole reconstructions against a plain walk over the finished map.
+// Sums over a map: the scalar kernels against literal values, every instruction set against
+// them, and whole reconstructions against a plain pass over the finished map.
 #include "daemon/recon/depth_sums.hpp"
 
 #include <gtest/gtest.h>
@@ -95,7 +95,7 @@ class VectorSums : public EveryTarget {
   int uniform(int low, int high) {
     return low + static_cast<int>(random_() % (static_cast<unsigned>(high - low) + 1));
   }
-  /// Flat and steep places, ties, holes and both ends of what a depth may be.
+  /// Flat and steep places, ties, holes and both ends of the range of depth.
   std::vector<std::int16_t> map_of(int pixels) {
     std::vector<std::int16_t> map;
     const int kind = uniform(0, 3);
@@ -131,7 +131,7 @@ TEST_P(VectorSums, EveryPlaceAndWidth) {
         kernels::sum_row(map.data() + std::ptrdiff_t{y} * stride, y, from, to, should);
       }
       ASSERT_EQ(all_of(is), all_of(should)) << from << " to " << to;
-      vec::sum_rows(map.data(), stride, from, to, 0, 1, is);  // and what came before it
+      vec::sum_rows(map.data(), stride, from, to, 0, 1, is);  // added to the previous sums
       kernels::sum_row(map.data(), 0, from, to, should);
       ASSERT_EQ(all_of(is), all_of(should)) << from << " to " << to;
     }

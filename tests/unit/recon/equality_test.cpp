@@ -25,8 +25,8 @@ class Equality : public EveryTarget {
   int uniform(int low, int high) {
     return low + static_cast<int>(random_() % static_cast<unsigned>(high - low + 1));
   }
-  /// A lens that bends rows and columns, a LUT that is looked up entry by entry or, at even
-  /// widths, has knots, a mask and a reference that is not the calibration's.
+  /// A lens that bends rows and columns, a mask, and a reference that is not the calibration's. The
+  /// LUT is read entry by entry or, at even widths, by knots.
   Model make_model(const Shape& shape, Method method) {
     Model model;
     model.method = method;
@@ -61,7 +61,7 @@ class Equality : public EveryTarget {
       model.scattering = Scattering{.narrow_mm = 0.012 + shape.smoothing_px * 0.008,
                                     .wide_mm = 0.21 + shape.smoothing_px * 0.03,
                                     .narrow_weight = 0.6};
-      // Each LUT says otherwise at any level.
+      // Each LUT differs at every level.
       model.sharpened = {{.steps = 1, .lut = model.lut, .uncertainty = {}},
                          {.steps = 2, .lut = model.lut, .uncertainty = {}}};
       for (Model::Sharpened& sharpened : model.sharpened) {
@@ -147,7 +147,7 @@ TEST_P(Equality, HalfAndQuarterResolution) {
 TEST_P(Equality, Sharpened) {
   for (const int steps : {1, 2}) {
     for (const Shape& shape : kShapes) check(shape, Method::lut, 1, steps);
-    // As the daemon has it.
+    // The daemon's shapes.
     for (const Shape& shape : {Shape{581, 163, 2}, Shape{130, 70, 1.4}}) {
       check(shape, Method::lut, 4, steps);
     }

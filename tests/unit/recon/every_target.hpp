@@ -12,8 +12,8 @@
 
 namespace dtact::recon {
 
-/// A test that runs once on each instruction set that this machine has and the kernels were built
-/// for.
+/// A test that runs once on each instruction set that this machine and the build of the kernels
+/// have.
 class EveryTarget : public testing::TestWithParam<std::int64_t> {
  protected:
   void SetUp() override { hwy::SetSupportedTargetsForTest(GetParam()); }

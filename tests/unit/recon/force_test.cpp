@@ -1,4 +1,4 @@
-// The law of force against the simulator's gel, which solves contact on a grid of its own.
+// The force law against the simulator's gel, which solves contact on a grid of its own.
 #include "daemon/recon/force.hpp"
 
 #include <gtest/gtest.h>
@@ -20,13 +20,13 @@ constexpr int kWidth = 500;
 constexpr int kHeight = 400;
 constexpr double kMmPerPx = 0.0417;
 
-// Places of the map on the solver's grid.
+// The solver's grid for the map.
 constexpr int kGrid = 256;
 constexpr double kSpacing = 0.125;
 
 double place(double px, int size) { return (px - 0.5 * (size - 1)) * kMmPerPx; }
 
-/// As a camera sees it through the gel: a Gaussian of 0.2 thicknesses, along rows, then columns.
+/// The map as a camera sees it through the gel: a Gaussian of 0.2 thicknesses along both axes.
 cv::Mat1d blurred(const cv::Mat1d& map, double thickness_mm) {
   const double sigma = 0.2 * thickness_mm / kSpacing;
   const int reach = static_cast<int>(4 * sigma);
@@ -54,7 +54,7 @@ struct Contact {
   double mm2 = 0;  ///< True force over the modulus.
 };
 
-/// `height_mm(x, y)`: of the object above its lowest point.
+/// `height_mm(x, y)` is the object's height above its lowest point.
 template <typename Height>
 Contact press(double thickness_mm, double depth_mm, Height height_mm) {
   const hal::sim::ElasticLayer layer(kGrid, kGrid, kSpacing, thickness_mm);

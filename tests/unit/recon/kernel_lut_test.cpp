@@ -51,7 +51,7 @@ TEST(KernelLut, AStraightLutStaysWhatItIs) {
   EXPECT_EQ(lut.last_q6, 3841);
   for (std::size_t i = 0; i < model.lut.um.size(); ++i) ASSERT_EQ(lut.um[i], model.lut.um[i]) << i;
   EXPECT_EQ(lut.um[6401], kUntrusted);  // beyond the covered range
-  EXPECT_EQ(lut.um[6402], kUntrusted);  // what vector kernels mark
+  EXPECT_EQ(lut.um[6402], kUntrusted);  // the mark of the vector kernels
 }
 
 TEST(KernelLut, ACurvedLutIsFollowedWithinAMicrometreAndRises) {
@@ -101,7 +101,7 @@ TEST(KernelLut, ALutThatIsNotStraightBetweenKnotsIsLookedUpEntryByEntry) {
   };
   // Steps of half a level: 8 µm above and below any line.
   expect_kept(model_of(-20, 80, [](double level) { return 32 * std::floor(2 * level) / 2; }));
-  // Deeper than eighths of a micrometre reach.
+  // This depth is beyond the range of eighths of a micrometre.
   expect_kept(model_of(-20, 80, [](double level) { return 70 * level; }));
 }
 

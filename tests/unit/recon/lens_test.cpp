@@ -8,7 +8,7 @@
 namespace dtact::recon {
 namespace {
 
-/// 20 pixels a millimetre, the origin at (5, 4), distortion about (5, 4): worked out by hand below.
+/// 20 pixels a millimetre, the origin at (5, 4), distortion about (5, 4): computed by hand below.
 Lens sample() {
   Lens lens;
   lens.homography = {20, 0, 5, 0, 20, 4, 0, 0, 1};

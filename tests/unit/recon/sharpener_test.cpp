@@ -138,7 +138,7 @@ TEST(Sharpener, TapsSumToOneAndTheCoarseGridTakesItsOwnBlurOff) {
   // √((1.23/0.1655)² − 15/12 − 16/6)/4 = 1.791 coarse pixels.
   EXPECT_EQ(wide, (std::vector<std::int16_t>{3650, 3124, 1957, 898, 301, 74, 13}));
   EXPECT_EQ(Sharpener::wide_share_q15(scattering), 9830);
-  // Means and reading blur more than that already.
+  // The means and the interpolation blur more than this already.
   EXPECT_EQ(Sharpener::wide_taps({.narrow_mm = 0.1, .wide_mm = 0.3, .narrow_weight = 1}, 0.2),
             std::vector<std::int16_t>{kernels::kTapOne});
   EXPECT_EQ(Sharpener::wide_share_q15({.narrow_mm = 0.1, .wide_mm = 0.3, .narrow_weight = 0}),
@@ -146,7 +146,7 @@ TEST(Sharpener, TapsSumToOneAndTheCoarseGridTakesItsOwnBlurOff) {
 }
 
 TEST(Sharpener, SaysWhatItReads) {
-  // Wide: 7 coarse pixels at most, even 8; one more for the reading.
+  // Wide: 7 coarse pixels at most, even 8; one more for the interpolation.
   const Sharpener sharpener({.narrow_mm = 0.2, .wide_mm = 1.4, .narrow_weight = 0.7}, 2, 0.16, 400,
                             300);
   EXPECT_EQ(sharpener.reach(), 2 * 4 * (8 + 1));

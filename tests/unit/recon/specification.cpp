@@ -119,7 +119,7 @@ Specification::Plane Specification::sharpen(const Plane& level, const Plane& bef
     kernels::shrink_row(rows, width, means.data() + std::ptrdiff_t{row} * width);
   }
   means = smooth(means, width, height, Sharpener::wide_taps(*model_.scattering, model_.mm_per_px));
-  // A column more on either side, as its own last one.
+  // One column more on either side repeats the last one.
   const auto widened = [&](int row) {
     const auto from = means.begin() + std::ptrdiff_t{std::clamp(row, 0, height - 1)} * width;
     Plane out{*from};

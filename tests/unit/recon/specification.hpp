@@ -10,8 +10,8 @@
 
 namespace dtact::recon {
 
-/// What a reconstruction is: the scalar kernels, each over the whole image before the next, with no
-/// strips, rings or tiles. Slow and plain; whatever runs in the daemon gives the same bits.
+/// Defines a reconstruction: the scalar kernels, each over the whole image before the next, without
+/// strips, rings or tiles. Slow and plain; the daemon's code gives the same bits.
 class Specification {
  public:
   explicit Specification(const Model& model, int sharpen_steps = 0);

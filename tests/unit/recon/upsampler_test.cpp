@@ -21,7 +21,7 @@ std::vector<std::int16_t> upsampled(Upsampler upsampler, const std::vector<std::
 }
 
 TEST(Upsampler, ReadsBilinearlyAndHoldsTheEdge) {
-  // Middles of fine pixels lie at −3/8, −1/8, 1/8, 3/8, … of a coarse one.
+  // Middles of fine pixels are at −3/8, −1/8, 1/8, 3/8, … of a coarse one.
   EXPECT_THAT(upsampled(Upsampler(8, 1 * 4, 4, 1), {0, 80}),
               ElementsAre(0, 0, 10, 30, 50, 70, 80, 80,  //
                           0, 0, 10, 30, 50, 70, 80, 80,  //
@@ -34,8 +34,8 @@ TEST(Upsampler, ReadsBilinearlyAndHoldsTheEdge) {
 }
 
 TEST(Upsampler, FollowsWhatWasLeftOutOnEitherSide) {
-  // Of ten columns a quarter's map leaves one out before the first and one behind the last pixel;
-  // those of half the resolution lie on a coarse middle or halfway between two.
+  // A quarter's map of ten columns leaves out one before the first pixel and one behind the last.
+  // The pixels at half the resolution are at a coarse middle or halfway between two.
   EXPECT_THAT(upsampled(Upsampler(10, 4, 4, 2), {0, 80}), ElementsAre(0, 0, 40, 80, 80,  //
                                                                       0, 0, 40, 80, 80));
   const std::vector<std::int16_t> fine = upsampled(Upsampler(10, 4, 4, 1), {0, 80});

@@ -24,7 +24,7 @@ class VectorKernels : public EveryTarget {
   int uniform(int low, int high) {
     return low + static_cast<int>(random_() % static_cast<unsigned>(high - low + 1));
   }
-  /// Values of the whole range, the ends among them.
+  /// Values of the whole range, including its ends.
   std::vector<std::int16_t> values(int count, int low, int high) {
     std::vector<std::int16_t> out(static_cast<std::size_t>(count));
     for (std::int16_t& v : out) {
@@ -50,7 +50,7 @@ class VectorRectify : public VectorKernels {
 
   void SetUp() override {
     VectorKernels::SetUp();
-    // 64 readable bytes after the last pixel and not one more.
+    // 64 readable bytes follow the last pixel and no more.
     constexpr std::size_t kUsed = std::size_t{kFrameWidth + 5} * kFrameHeight + 64;
     static_assert(kUsed <= kPage);
     void* const pages =
@@ -68,14 +68,14 @@ class VectorRectify : public VectorKernels {
     ::munmap(pages_, 2 * kPage);
     VectorKernels::TearDown();
   }
-  /// One row of a map, in full and in every part, against the scalar kernel.
+  /// Checks one row of a map, in full and in every part, against the scalar kernel.
   void check(const std::vector<Entry>& entries) {
     const int width = static_cast<int>(entries.size());
     const RectifyTable table{kFrameWidth, kFrameHeight, width, 1, entries};
     RectifyPlan plan(table);
     const std::vector<std::int16_t> reference = values(padded(width), 0, 16320);
     const std::ptrdiff_t stride = kFrameWidth + uniform(0, 5);
-    // As far back as the frame's last pixel allows.
+    // The start is as far back as the frame's last pixel allows.
     const std::uint8_t* luma =
         luma_.data() + luma_.size() - 64 - kFrameWidth - stride * (kFrameHeight - 1);
     std::vector<std::int16_t> should(entries.size());
@@ -96,7 +96,7 @@ class VectorRectify : public VectorKernels {
       }
     }
   }
-  /// One row of a coarse map whose `decimation` rows of the table are `entries`.
+  /// Checks one row of a coarse map whose `decimation` rows of the table are `entries`.
   void check_mean(const std::vector<Entry>& entries, int decimation) {
     const int fine_width = static_cast<int>(entries.size()) / decimation;
     const int width = fine_width / decimation;
@@ -333,7 +333,7 @@ TEST_P(VectorLut, WritesOverItsOwnInput) {
   std::vector<std::int16_t> um = values(150 * 64 + 1, -32767, 32767);
   um.push_back(kUntrusted);
   const kernels::LutView lut{um.data(), -40 * 64, 110 * 64, 100 * 64};
-  // Longer than the places that are looked up at once, too.
+  // Some are longer than the number of entries that are read at once.
   for (const int width : {1, 31, 32, 33, 100, 640, 641, 1400}) {
     const int stride = padded(width);
     std::vector<std::int16_t> rows = values(2 * stride, -32768, 32767);

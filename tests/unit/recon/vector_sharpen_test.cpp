@@ -22,7 +22,7 @@ class VectorSharpen : public EveryTarget {
   static constexpr std::int16_t kUnwritten = 12321;
 
   int uniform(int low, int high) { return std::uniform_int_distribution(low, high)(random_); }
-  /// Values of the whole range, the ends among them.
+  /// Values of the whole range, including its ends.
   std::vector<std::int16_t> values(int count, int low, int high) {
     std::vector<std::int16_t> out(static_cast<std::size_t>(count));
     for (std::int16_t& v : out) {
@@ -32,7 +32,7 @@ class VectorSharpen : public EveryTarget {
     return out;
   }
   std::vector<std::int16_t> levels(int count) { return values(count, -kSmoothable, kSmoothable); }
-  /// Written from block `first` to `last` as `all` is, nowhere else.
+  /// Checks that blocks `first` to `last` equal `all` and that nothing else was written.
   static void expect_part(const std::vector<std::int16_t>& part,
                           const std::vector<std::int16_t>& all, int first, int last) {
     for (int x = 0; x < static_cast<int>(all.size()); ++x) {
@@ -97,7 +97,7 @@ TEST_P(VectorSharpen, SharpenRow) {
     sharpen_row({level.data(), before.data(), narrow.data(), wide}, share, first, last,
                 part.data());
     expect_part(part, all, first * kBlock, last * kBlock);
-    // Over what it reads, as the second step does.
+    // In place, like the second step.
     std::vector<std::int16_t> own = before;
     sharpen_row({level.data(), own.data(), narrow.data(), wide}, share, 0, blocks, own.data());
     ASSERT_EQ(own, all);

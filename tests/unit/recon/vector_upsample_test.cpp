@@ -1,4 +1,4 @@
-// The vector kernels that read a coarse map, against the scalar ones.
+// The vector kernels that interpolate a coarse map, against the scalar ones.
 #include "daemon/recon/vector_upsample.hpp"
 
 #include <gtest/gtest.h>
@@ -20,7 +20,7 @@ class VectorUpsample : public EveryTarget {
   static constexpr std::int16_t kUnwritten = 12321;
 
   int uniform(int low, int high) { return std::uniform_int_distribution(low, high)(random_); }
-  /// Depths of the whole range, its ends and untrusted ones among them.
+  /// Depths of the whole range, including its ends and untrusted ones.
   std::vector<std::int16_t> depths(int count) {
     std::vector<std::int16_t> out(static_cast<std::size_t>(count));
     for (std::int16_t& um : out) {

@@ -1,4 +1,4 @@
-// dtactctl export, on a recording made here.
+// dtactctl export, on a recording that the test makes.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -99,7 +99,7 @@ TEST_F(Export, Tables) {
             "1700000000233333338,14,1233333338,contact_made,deepest_mm=0.5\n");
 }
 
-// Of a longer recording in another format, say. What is no export's stays.
+// An earlier export may be longer and in another format. Files that no export wrote stay.
 TEST_F(Export, ForceReplacesAnEarlierExport) {
   ASSERT_EQ(run({"--to", "png"}), 0) << said_;
   base::write_file_atomically(out_ / "depth-notes.png", "mine");

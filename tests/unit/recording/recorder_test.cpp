@@ -50,7 +50,7 @@ v1::Event event() {
   return event;
 }
 
-/// A disk that takes nothing until it is let go.
+/// A disk that accepts nothing until it is released.
 class StuckDisk final : public mcap::Sink {
  public:
   explicit StuckDisk(const fs::path& path) : file_(path, true) {}
@@ -75,7 +75,7 @@ class StuckDisk final : public mcap::Sink {
 
 TEST_F(RecorderTest, ASlowDiskDropsFramesAndNoEvents) {
   StuckDisk disk(path_);
-  // Some 14 of them are a chunk, which is written at once, and then nothing goes on.
+  // Some 14 of them are a chunk, which is written at once; the writer then blocks.
   const auto large = [](std::uint64_t sequence) {
     v1::Frame frame = sample_frame(sequence);
     frame.mutable_jpeg()->set_data(std::string(300'000, 'x'));

@@ -60,7 +60,7 @@ TEST_F(RecordingFile, KeepsAFrameWholeAndItsJpegOnce) {
   handlers.frame = [&](const v1::Frame& frame, std::uint64_t time) {
     EXPECT_EQ(time, static_cast<std::uint64_t>(frame.wall_ns()));
     v1::Frame expected = sample_frame(frame.sequence());
-    // The JPEG says its size itself.
+    // The JPEG itself has its size.
     expected.mutable_jpeg()->clear_width();
     expected.mutable_jpeg()->clear_height();
     EXPECT_EQ(frame.SerializeAsString(), expected.SerializeAsString());
@@ -126,7 +126,7 @@ TEST_F(RecordingFile, ReportsEachLightOnce) {
   EXPECT_THAT(rows(kLightTopic), SizeIs(2));
 }
 
-// Any reader of protobuf can be built from the file alone.
+// The file alone is enough to build a reader of its messages.
 TEST_F(RecordingFile, CarriesItsSchemas) {
   RecordingWriter writer(sink_, {.program = "test"});
   writer.add(sample_frame(0));

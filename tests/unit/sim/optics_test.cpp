@@ -112,7 +112,7 @@ TEST(Optics, AResponseByKnotsIsTheIntegralOfItsSlopes) {
   EXPECT_DOUBLE_EQ(response(optics, 0.0, 2.0), 0.0);
 }
 
-// The variance across of the light that is lost round a small square, less the square's own; the
+// The variance across of the light that is lost around a small square, less the square's own; the
 // square is 8 points wide.
 double variance_of(const OpticsModel& optics, std::int16_t indentation_of_square) {
   GelModel gel;
@@ -147,7 +147,7 @@ TEST(Optics, WidthsFollowTheLocalThickness) {
   optics.narrow_mm = 1.0;
   optics.narrow_weight = 1;
   optics.growth = 1;
-  // 1.6 mm of 4 leave 0.6 of the thickness; widths are kept for just that.
+  // 1.6 mm of 4 leave 0.6 of the thickness; widths are kept only there.
   EXPECT_NEAR(variance_of(optics, 12800), 0.36, 0.02);
   // 0.8 mm: half of the light goes 1 mm wide, half 0.6.
   EXPECT_NEAR(variance_of(optics, 6400), 0.5 * (1 + 0.36), 0.02);

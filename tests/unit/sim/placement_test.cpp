@@ -68,7 +68,7 @@ TEST(Placement, TiltTurnsAfterTheRotation) {
   EXPECT_NEAR(edge[2], std::sin(15 * kDegree), 1e-9);  // tilt_x lifts the lower edge
 }
 
-// A ball is one from all sides: tilted by a it is the upright one R sin(a) farther along.
+// A ball looks the same from all sides: tilted by a it is the upright one R sin(a) farther along.
 TEST(Placement, ATiltedBallIsABall) {
   for (const double tilt : {15.0, 45.0, -60.0}) {
     const cv::Mat1d tilted = target_of(ball(2), key_of(1.1, tilt, 0));
@@ -76,7 +76,7 @@ TEST(Placement, ATiltedBallIsABall) {
     for (int i = 0; i < kPlate.height; ++i) {
       for (int j = 0; j < kPlate.width; ++j) {
         const double r = std::hypot(j * 0.125 - 10, i * 0.125 - 10 - centre);
-        if (r > 1.98) continue;  // the line runs along the side: a step may pass it by
+        if (r > 1.98) continue;  // near the side a step of the search may miss it
         ASSERT_NEAR(tilted(i, j), 1.1 - (2 - std::sqrt(4 - r * r)), 3e-6);
       }
     }

@@ -30,7 +30,7 @@ std::uint64_t checksum(const image::Grey8& image) {
   return hash;
 }
 
-// A sensor whose numbers stand here, so that tuning the built-in one does not change the bytes.
+// A sensor with fixed numbers, so that tuning the built-in one does not change the bytes.
 const std::string kFixedSensor = R"(
 read_noise = 0.6
 [optics]
@@ -55,7 +55,7 @@ TEST(Renderer, SameSeedSameBytesWithEveryCompiler) {
   Scene scene = parse_scene(toml + kBallPress, "fixed.toml");
   scene.gel.texture = 0.002;
   scene.gel.texture_mm = 0.3;
-  // Recorded from this program; gcc 12 and clang 19 agree.
+  // Recorded from this program; gcc 12 and clang 19 give the same.
   EXPECT_EQ(checksum(render_frame(scene, 0, {}, 1)), 3335524664780952345U);
   EXPECT_EQ(checksum(render_frame(scene, 17, {}, 1)), 16580221340756209375U);
 }
@@ -64,10 +64,10 @@ TEST(Renderer, FramesDoNotDependOnTheirOrder) {
   const Scene scene = small_scene();
   Renderer renderer(scene, 5);
   const auto pressed = frame(renderer, 30);
-  const auto untouched = frame(renderer, 3);
+  const auto no_contact = frame(renderer, 3);
   (void)frame(renderer, 14);
   EXPECT_EQ(frame(renderer, 30).pixels, pressed.pixels);
-  EXPECT_EQ(frame(renderer, 3).pixels, untouched.pixels);
+  EXPECT_EQ(frame(renderer, 3).pixels, no_contact.pixels);
   EXPECT_EQ(render_frame(scene, 30, {}, 5).pixels, pressed.pixels);
   EXPECT_NE(render_frame(scene, 30, {}, 6).pixels, pressed.pixels);
 }

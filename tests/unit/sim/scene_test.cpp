@@ -110,7 +110,7 @@ class CalibratedScene : public ::testing::Test {
   std::filesystem::path folder_ = fakes::own_path();
 };
 
-// As dtact-calibrate writes it, errors beside the numbers.
+// dtact-calibrate writes this form, errors beside the numbers.
 std::string model(double bulge_factor) {
   return fmt::format(
       "[gel]\nthickness_mm = [2.4, 0.1]\nnarrow_mm = [0.12, 0.01]\nwide_mm = [1.16, 0.1]\n"

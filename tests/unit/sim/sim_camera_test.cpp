@@ -274,7 +274,7 @@ TEST_F(SimCameraTest, PacedFramesComeInOrderAndTheNewestFirst) {
 }
 
 TEST_F(SimCameraTest, PacedUnplugIsReportedAtOnceAndEnds) {
-  // Two seconds: a machine that is busy for longer than it lasts skips it.
+  // Two seconds: a machine that is busy for longer than that skips it.
   SimCamera camera(config(fault("unplug", 3, 200), "luma", true), link_);
   camera.start();
   Frame frame;

@@ -28,7 +28,7 @@ keys = [ { t = 1.0 }, { t = 2.0, depth = 1.0 } ]
 
 inline constexpr std::size_t kPixels = 19200;  // 160 · 120
 
-/// Where a pixel of that sensor lies in its row-major image.
+/// Index of a pixel in the sensor's row-major image.
 constexpr std::size_t pixel(int x, int y) {
   return static_cast<std::size_t>(y) * 160 + static_cast<std::size_t>(x);
 }

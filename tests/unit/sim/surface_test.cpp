@@ -83,8 +83,8 @@ TEST(Surface, APoseStandsOnTheNormal) {
   EXPECT_NEAR(pose.turn_deg[0], -28.64788976, 1e-6);
 }
 
-// Along the normal at the arc s from its lowest point a ball of radius r, d deep in a sphere of
-// radius R, begins where R' on the normal has the distance r to its centre at R + r − d.
+// A ball of radius r is pressed d deep into a sphere of radius R. On the normal at the arc s from
+// its lowest point it begins at the R' that has distance r to its centre at R + r − d.
 TEST(Surface, ABallOnASphereReachesAsDeepAsGeometrySays) {
   const Grid grid{81, 81, 0.125, -5, -5};
   cv::Mat1d target(grid.height, grid.width, -kNoSurface);

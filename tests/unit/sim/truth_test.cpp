@@ -23,7 +23,7 @@ TEST(Truth, FollowsTheDepthOverTime) {
   EXPECT_EQ(deepest(truth, 0), 0);
   EXPECT_EQ(deepest(truth, 10), 0);
   EXPECT_NEAR(deepest(truth, 15), 0.5, 0.01);
-  EXPECT_NEAR(deepest(truth, 20), 1.0, 0.01);  // the pixels lie beside the lowest point
+  EXPECT_NEAR(deepest(truth, 20), 1.0, 0.01);  // the pixels are beside the lowest point
   EXPECT_NEAR(deepest(truth, 5000), 1.0, 0.01);
 }
 
@@ -74,7 +74,7 @@ object = "ball"
 radius_mm = 4.0
 keys = [ { t = 1.0 }, { t = 2.0, depth = 0.6 }, { t = 3.0 }, { t = 4.0, depth = 0.0 } ]
 )");
-  EXPECT_EQ(Truth(scene).map_count(), 3U);  // untouched, 0.3 mm, 0.6 mm
+  EXPECT_EQ(Truth(scene).map_count(), 3U);  // no contact, 0.3 mm, 0.6 mm
 }
 
 TEST(Truth, PlaceAndRotationAreTheSenses) {
@@ -117,7 +117,7 @@ keys = [ { t = 1.0 }, { t = 2.0, depth = 1.0 }, { t = 3.0, x = 2.0, rotation = 1
   EXPECT_THROW((void)truth.pose(1, 0), std::out_of_range);
 }
 
-// Of a bonded gel no thicker than the contact is wide: more than the half-space's 16/9 E √R
+// A bonded gel no thicker than the contact is wide needs more than the half-space's 16/9 E √R
 // d^1.5.
 TEST(Truth, ForceGrowsWithDepthAndIsYoungsModulusTimesAShape) {
   Scene scene = small_scene();  // R = 4 mm, 1 mm at frame 20

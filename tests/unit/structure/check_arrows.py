@@ -26,13 +26,13 @@ ROOMS = {
     "hal": ["hal/null", "hal/replay", "hal/sim", "hal/v4l2", "hal/libcamera", "hal/ws2812"],
     "daemon/recon": [],
     "daemon/calibration": ["hal/base", "hal/files", "daemon/recon"],
-    # The two rooms inside know of the pipeline its settings, conditions and the frame it fills.
+    # The two rooms inside may use the pipeline's settings, health flags and the frame that it fills.
     "daemon/pipeline/reference": ["hal", "hal/base", "hal/files", "daemon/recon", "daemon/calibration", "daemon/pipeline"],
     "daemon/pipeline/depth": ["hal", "hal/base", "daemon/recon", "daemon/pipeline", "daemon/pipeline/reference"],
     "daemon/pipeline": ["hal", "hal/base", "daemon/recon", "daemon/calibration", "daemon/pipeline/reference", "daemon/pipeline/depth"],
     "daemon/serve": ["hal/base", "proto"],
     "daemon/net": ["daemon/serve", "hal", "hal/base", "hal/files", "proto", "daemon/pipeline", "daemon/calibration", "daemon/recon"],
-    # The text alone is made of what the network part gives; nothing includes it but the assembly.
+    # Metrics are text of the network part's overview; only the assembly includes it.
     "daemon/metrics": ["daemon/net"],
     "daemon/announce": ["hal/base", "proto"],
     "daemon/app/doctor": ["hal", "hal/base", "hal/gpiod", "hal/v4l2", "hal/ws2812"],
@@ -40,7 +40,7 @@ ROOMS = {
     "daemon": ["daemon/app", "daemon/app/doctor"],
     "proto": [],
     "clients/cpp": ["hal/base", "proto"],
-    # Of the reconstruction the surface's shape alone.
+    # Only the surface's shape from the reconstruction.
     "clients/geometry": ["daemon/recon"],
     "clients/perceive/pose": ["clients/geometry"],
     "clients/common": ["daemon/serve", "hal/base", "hal/files", "proto", "daemon/recon", "clients/cpp", "clients/geometry"],
@@ -50,20 +50,20 @@ ROOMS = {
     "clients/calibrate/lens": ["daemon/recon"],
     "clients/calibrate/offline": ["hal/base", "hal/files", "daemon/recon", "daemon/calibration", "clients/common", "clients/calibrate/fit", "clients/calibrate/fit/model", "clients/calibrate/lens"],
     "clients/calibrate/guided": ["hal/base", "hal/files", "proto", "daemon/recon", "daemon/calibration", "clients/common", "clients/cpp", "clients/calibrate/fit", "clients/calibrate/offline"],
-    # Depth of a recording, made by what makes it in the daemon.
+    # Reprocesses a recording's depth with the daemon's own code.
     "clients/calibrate/reprocess": ["hal", "hal/base", "hal/files", "hal/luma", "hal/mjpeg", "proto", "daemon/calibration", "daemon/pipeline/reference", "daemon/pipeline/depth", "clients/common", "clients/recording"],
     # Contacts of pictures and of recordings.
     "clients/calibrate/force": ["hal/base", "hal/files", "daemon/recon", "daemon/calibration", "clients/common", "clients/cpp", "clients/calibrate/offline", "clients/recording"],
     "clients/calibrate": ["clients/common", "clients/calibrate/force", "clients/calibrate/guided", "clients/calibrate/offline", "clients/calibrate/reprocess"],
-    # A client and a server: what serves the wire is the daemon's own.
+    # A client and a server: it serves the wire with the daemon's own code.
     "clients/perceive": ["hal/base", "proto", "daemon/recon", "daemon/serve", "clients/common", "clients/cpp", "clients/geometry", "clients/perceive/pose"],
     # The same for browsers.
     "clients/web/foxglove": ["proto", "daemon/serve", "clients/cpp", "clients/common", "clients/recording", "clients/web"],
     "clients/web": ["hal/base", "proto", "daemon/serve", "clients/common", "clients/cpp", "clients/web/foxglove"],
-    # A daemon's administration: neither a fit nor OpenCV.
+    # Administers a daemon: neither a fit nor OpenCV.
     "clients/ctl": ["hal/base", "hal/files", "hal/v4l2", "proto", "clients/common", "clients/cpp", "clients/recording"],
 }
-# Only standard headers and Highway may stand in angle brackets here.
+# Only standard headers and Highway may be in angle brackets here.
 STANDARD_ONLY = {"daemon/recon": re.compile(r"^(hwy/.*|[a-z_]+)$")}
 # The daemon links OpenCV's core module and no other.
 OPENCV_CORE = re.compile(r"^opencv2/core(\.hpp|/.*)$")
@@ -71,7 +71,7 @@ INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]', re.M)
 
 
 def room_of(path):
-    """The deepest room that `path` (relative to the top) lies in, or None."""
+    """The deepest folder of the map that contains `path` (relative to the top), or None."""
     parent = pathlib.PurePosixPath(path).parent
     while str(parent) != ".":
         if str(parent) in ROOMS:

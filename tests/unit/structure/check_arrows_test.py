@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The check of the arrows finds what it is there to find."""
+"""The check of the arrows finds forbidden includes."""
 import pathlib
 import tempfile
 import unittest

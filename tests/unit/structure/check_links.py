@@ -19,10 +19,10 @@ RULES = {
                  FITS + ["dtact::calibration::load", "dtact::recon::Reconstructor::run"]),
     "dtact-calibrate": (["core", "imgproc", "calib3d"],
                         ["systemd", "gpiod", "camera", "spdlog"], []),
-    # Depth it is given.
+    # It receives depth.
     "dtact-perceive": ([], ["tomlplusplus", "systemd", "gpiod", "camera", "spdlog"],
                        FITS + ["dtact::calibration::load", "dtact::recon::Reconstructor::run"]),
-    # It passes on.
+    # It only forwards.
     "dtact-web": ([], ["tomlplusplus", "systemd", "gpiod", "camera", "spdlog"],
                   FITS + ["dtact::calibration::load", "dtact::recon::Reconstructor::run"]),
 }
@@ -51,7 +51,7 @@ def output(*command):
 
 def main():
     found = []
-    # A name that is no longer anywhere would forbid nothing.
+    # A name that no longer exists would forbid nothing.
     calibrate = output("nm", "-C", sys.argv[3])
     found += [f"{name} is not in dtact-calibrate: name another here"
               for name in sorted({f for rule in RULES.values() for f in rule[2]})
@@ -59,7 +59,7 @@ def main():
     for name, program in zip(RULES, sys.argv[1:], strict=True):
         libraries = re.findall(r"\(NEEDED\).*\[(.*)\]", output("readelf", "-dW", program))
         if not libraries:
-            found.append(f"{program} names no libraries: readelf told nothing")
+            found.append(f"{program} names no libraries: readelf printed nothing")
         found += complaints(name, libraries, output("nm", "-C", program))
     print("\n".join(found + [f"{len(found)} links that must not be"]))
     return 1 if found else 0

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The check of the links finds what it is there to find."""
+"""The check of the links finds forbidden libraries."""
 import unittest
 
 from check_links import complaints

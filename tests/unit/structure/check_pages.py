@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Checks that what the pages (*.md) link to within the repository is there: files and headings."""
+"""Checks that links of the pages (*.md) within the repository lead to existing files and headings."""
 import pathlib
 import re
 import sys
@@ -10,7 +10,7 @@ ELSEWHERE = re.compile(r"[a-z][a-z0-9+.-]*:")
 
 
 def anchors(page):
-    """What a page's headings are called in a link: small letters, blanks as hyphens, no signs."""
+    """The anchors of a page's headings: small letters, hyphens for blanks, no punctuation."""
     headings = re.findall(r"^#+ +(.+)$", CODE.sub("", page), re.M)
     return {re.sub(r"[^\w\- ]", "", heading.strip().lower()).replace(" ", "-") for heading in headings}
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The check of the pages' links finds what it is there to find."""
+"""The check of the pages' links finds broken ones."""
 import pathlib
 import tempfile
 import unittest

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# The units of systemd/: well formed, hardened, alike, and never given up.
+# The units of systemd/ are well formed, hardened, consistent, and restarted without end.
 # check_unit_file.sh SYSTEMD_FOLDER DTACTD
 set -euo pipefail
 source=$1 program=$2
@@ -40,7 +40,7 @@ for unit in dtactd.service dtactd@.service; do
       grep -qx "$line" "$source/$unit" || fail "$unit has no $line"
     done
   done
-  # These would let the units score better, and the capture thread run worse.
+  # These would improve the units' score and slow the capture thread down.
   ! grep -qE '^(RestrictRealtime=yes|SystemCallFilter=~.*@resources)' "$source/$unit" || fail "$unit forbids FIFO"
 done
 
@@ -53,8 +53,8 @@ for unit in dtact-perceive.service dtact-web.service; do
   [[ -z $complaint ]] || fail "$unit: its drop-in: $complaint"
 done
 
-# The instances are the one service under other names, by which clients know them. It alone keeps its folder in /run, which is
-# theirs, too.
+# The instances are the same service under other names, by which clients know them. Only dtactd.service keeps its folder in
+# /run, because the instances share it.
 settings() { grep -vE '^(#|$)' "$source/$1"; }
 difference=$(diff <(settings dtactd.service | sed -E '/^RuntimeDirectoryPreserve=yes$/d
     s|^ExecStart=|Environment=DTACTD_NAME=%H-%i\n&|
@@ -62,7 +62,7 @@ difference=$(diff <(settings dtactd.service | sed -E '/^RuntimeDirectoryPreserve
     s|^(State\|Runtime)Directory=dtactd$|&/%i|; s|^(LoadCredential=.*:dtactd)|\1@%i|') \
   <(settings dtactd@.service)) || fail "the template differs: $difference"
 
-# The back-off is for systemd 254 and later; an older one knows neither key, and both are all it says.
+# The back-off needs systemd 254; an older one ignores both keys and reports only that.
 for unit in dtactd.service dtactd@.service; do
   mkdir "$folder/$unit.d"
   cp "$source/back-off.conf" "$source/network.conf" "$folder/$unit.d"

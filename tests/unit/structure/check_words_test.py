@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The check of words finds what it is there to find."""
+"""The check of words finds refused ones."""
 import pathlib
 import unittest
 

@@ -266,7 +266,7 @@ int EmulatedCamera::answer(unsigned long request, std::vector<std::uint8_t>& arg
       Control& known = controls_.at(control.id);
       const bool asked = !known.copied || !known.copy;
       if (asked) known.copy = known.value;
-      if (asked || streaming_) count_transfer();  // a stream always has some under way
+      if (asked || streaming_) count_transfer();  // a stream always has transfers under way
       control.value = *known.copy;
       return 0;
     }

@@ -14,13 +14,13 @@
 
 namespace dtact::hal::v4l2 {
 
-/// What the emulated driver fills a buffer with.
+/// Contents of a buffer that the emulated driver fills.
 struct EmulatedBuffer {
   std::vector<std::uint8_t> payload;
   std::uint32_t sequence = 0;
   std::uint32_t flags = V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC | V4L2_BUF_FLAG_TSTAMP_SRC_SOE;
   std::int64_t timestamp_us = -1;  ///< −1 = now.
-  std::uint32_t index_offset = 0;  ///< Added to the index: a driver that lies.
+  std::uint32_t index_offset = 0;  ///< Added to the index: a faulty driver.
 };
 
 /// /dev/video0 emulated in this process by libumockdev: a camera of 32×16 GREY at 60 frames a
@@ -44,17 +44,17 @@ class EmulatedCamera {
   void deliver_grey(std::uint8_t value, std::uint32_t sequence);
   void set_pixel_format(std::uint32_t fourcc);
   void set_driver(const std::string& name);
-  /// What S_FMT answers, whatever was asked; 0 = as asked.
+  /// The width that S_FMT answers for every request; 0 = as requested.
   void insist_on_width(std::uint32_t width);
   void insist_on_rate(std::uint32_t fps);
   void grant_buffers(std::uint32_t count);
-  /// As of a camera that has none; its hub has.
+  /// The camera has no serial number then; its hub has one.
   void forget_serial() const;
   void set_control(std::uint32_t id, std::int32_t value);
-  /// As uvcvideo does with controls that the camera doesn't call AUTO_UPDATE: asked once, and
-  /// answered from a copy from then on, in which settings are entered.
+  /// uvcvideo does this with controls that the camera doesn't call AUTO_UPDATE: it asks once and
+  /// answers from a copy from then on, in which settings are entered.
   void answer_from_a_copy(std::uint32_t id);
-  /// Takes every value without an error and stays as it is.
+  /// Accepts every value without an error and keeps its own.
   void ignore(std::uint32_t id);
   void refuse(std::uint32_t id);
   [[nodiscard]] std::int32_t control(std::uint32_t id) const;
@@ -77,8 +77,8 @@ class EmulatedCamera {
 
   UMockdevTestbed* testbed_;
   UMockdevIoctlBase* handler_;
-  std::string root_;     // of the emulated folders
-  std::string backing_;  // the file behind the node, which is what gets mapped
+  std::string root_;     // root of the emulated folders
+  std::string backing_;  // the file behind the node, which is mapped
   mutable std::mutex mutex_;
   std::map<unsigned long, std::pair<int, int>> failures_;  // request → errno, times left
   std::deque<EmulatedBuffer> pending_;

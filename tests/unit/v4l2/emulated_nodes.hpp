@@ -9,9 +9,9 @@
 
 namespace dtact::hal::v4l2 {
 
-/// A video node that can be asked what it is and does nothing else.
+/// A video node that reports its capabilities and does nothing else.
 struct EmulatedNode {
-  int number = 0;  ///< Of /dev/videoN.
+  int number = 0;  ///< N of /dev/videoN.
   bool usb = false;
   std::uint32_t caps = 0;
   const char* name = "";  ///< Driver and card.

@@ -99,7 +99,7 @@ const EmulatedNode kUsbMetadata{.number = 1,
                                 .name = "uvcvideo",
                                 .bus = "usb-1"};
 
-/// A node of bcm2835-isp, of which a Pi 4 has four (bcm2835-v4l2-isp.c in raspberrypi/linux;
+/// A node of bcm2835-isp; a Pi 4 has four of them (bcm2835-v4l2-isp.c in raspberrypi/linux;
 /// V4L2's core adds V4L2_CAP_EXT_PIX_FORMAT to the capabilities, which are then 0x04200001).
 EmulatedNode scaler(int number) {
   return {.number = number,
@@ -112,7 +112,7 @@ const EmulatedNode kCodec{.number = 10,
                           .caps = V4L2_CAP_VIDEO_M2M_MPLANE | V4L2_CAP_STREAMING,
                           .name = "bcm2835-codec-decode",
                           .bus = "platform:bcm2835-codec"};
-/// A camera at a port of its own, such as bcm2835-unicam without a media controller.
+/// A camera at a port of its own, like bcm2835-unicam without a media controller.
 const EmulatedNode kPort{.number = 2,
                          .caps = kCapture,
                          .name = "unicam",
@@ -121,7 +121,7 @@ const EmulatedNode kPort{.number = 2,
                          .fourcc = V4L2_PIX_FMT_GREY,
                          .width = 640,
                          .height = 480};
-/// A Pi 5's camera interface: which image comes out is up to the media controller.
+/// A Pi 5's camera interface: the media controller decides which image comes out.
 const EmulatedNode kPipeline{.number = 3,
                              .caps = kCapture | V4L2_CAP_IO_MC,
                              .name = "rp1-cfe",
@@ -141,7 +141,7 @@ TEST(TheOnlyCamera, IsTheOneOnUsb) {
   const EmulatedNodes nodes({kUsb, kUsbMetadata, kPort, kPipeline, kCodec, scaler(14), scaler(15),
                              scaler(21), scaler(22)});
   EXPECT_EQ(opened("", 800, 600), "/dev/video0");
-  EXPECT_EQ(opened("", 640, 480), "/dev/video0");  // and then says which sizes it has
+  EXPECT_EQ(opened("", 640, 480), "/dev/video0");  // its error then lists the sizes
   EXPECT_EQ(list_attached().size(), 2U);           // both can be named
   EXPECT_EQ(opened("bus:platform:fe801000.csi", 800, 600), "/dev/video2");
 }
@@ -209,7 +209,7 @@ TEST(ListModes, ReadsARangeOfSizes) {
 
 TEST(StableName, IsNeverALinkThatUdevIsStillMaking) {
   const EmulatedNodes nodes({kUsb});
-  // As systemd's tempfn_random() names it. Shorter than the link it becomes.
+  // A name of systemd's tempfn_random(), shorter than the link that it becomes.
   nodes.link("/dev/v4l/by-path/.#a0123456789abcdef", 0);
   nodes.link("/dev/v4l/by-id/.#a0123456789abcdef", 0);
   EXPECT_EQ(list_attached().at(0).by_path, "");

@@ -102,7 +102,7 @@ TEST(PhotometricLock, SaysWhatIsRefused) {
   auto controls = applied(config, fd.get());
   ASSERT_EQ(controls.size(), 5U);
   EXPECT_EQ(controls[4].verdict, ControlVerdict::refused);
-  EXPECT_EQ(controls[4].value, 60);  // as it is, not as it should be
+  EXPECT_EQ(controls[4].value, 60);  // the actual value, not the requested one
   EXPECT_EQ(controls[4].note, "the camera refuses gain = 5 (Input/output error)");
 
   device.fail(VIDIOC_S_CTRL, 0);
@@ -140,14 +140,14 @@ struct Verdicts {
 
 class EachVerdict : public testing::TestWithParam<Verdicts> {};
 
-// What a control is told to be after both passes: the second one's answers may be the driver's own.
+// A control's verdict after both passes: the second answer may be the driver's own copy.
 TEST_P(EachVerdict, IsWhatTheCameraItselfHasSaid) {
   EmulatedCamera device;
   const base::UniqueFd fd = open_camera();
   const Verdicts& p = GetParam();
   if (p.copied) device.answer_from_a_copy(V4L2_CID_GAIN);
   if (p.ignored) device.ignore(V4L2_CID_GAIN);
-  if (p.asked_before) (void)list_controls(fd.get());  // by whatever program, since the plug
+  if (p.asked_before) (void)list_controls(fd.get());  // by any program since it was plugged in
   const PhotometricLock lock(V4l2Config{});
   const auto before = lock.apply(fd.get(), kUsbDevice);
   std::uint32_t type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
@@ -180,7 +180,7 @@ TEST(PhotometricLock, ConfirmsNothingWithoutAUsbDevice) {
   }
 }
 
-// Refused before the stream and taken in it: nothing has confirmed it.
+// Refused before the stream and accepted in it: not confirmed.
 TEST(PhotometricLock, WhatTheStreamBringsIsAccepted) {
   EmulatedCamera device;
   const base::UniqueFd fd = open_camera();

@@ -1,4 +1,4 @@
-// Calls of the camera's driver that fail, each of them, and the way back.
+// Failures of each call of the camera's driver, and recovery.
 #include <gtest/gtest.h>
 
 #include <cerrno>
@@ -97,7 +97,7 @@ TEST_P(StreamFails, CountsAsUnplugAndComesBack) {
   const std::uint64_t before = frame.info().sequence;
 
   device.fail(GetParam().first, GetParam().second);
-  // Without a frame to deliver, an error of QBUF would not be met.
+  // Without a frame to deliver, QBUF would not be called.
   EmulatedBuffer marked;
   marked.flags |= V4L2_BUF_FLAG_ERROR;
   device.deliver(marked);

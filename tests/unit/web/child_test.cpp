@@ -1,4 +1,4 @@
-// Another program, spoken with in lines.
+// A child process that speaks lines.
 #include "clients/web/guided/child.hpp"
 
 #include <gmock/gmock.h>
@@ -26,7 +26,7 @@ struct Received {
   std::string errors;
 };
 
-/// Runs a script of the shell's to its end. `with`: once it runs.
+/// Runs a shell script to its end. Calls `with` once the script runs.
 template <typename With>
 Received run(const std::string& script, const std::string& secret, With&& with) {
   boost::asio::io_context io;
@@ -65,7 +65,7 @@ TEST(Child, ReadsASecretThatNobodyElseCan) {
 }
 
 TEST(Child, HasNoneOfOurOtherFiles) {
-  std::array<int, 2> ours{};  // stay open over exec, as Asio's sockets do
+  std::array<int, 2> ours{};  // stay open over exec, like Asio's sockets
   ASSERT_EQ(::pipe(ours.data()), 0);
   const std::string list = "exec ls /proc/self/fd";  // the last is the folder that it reads
   EXPECT_THAT(run(list, "secret", [](Child&) {}).lines, ElementsAre("0", "1", "2", "3", "4"));
@@ -87,7 +87,7 @@ TEST(Child, TakesNoMoreThanItIsBoundTo) {
 TEST(Child, IsEndedAlsoWhereItWillNot) {
   const Received received = run("exec sleep 60", "", [](Child& child) { child.end(); });
   EXPECT_EQ(WTERMSIG(*received.status), SIGTERM);
-  // The trap stands once it says so.
+  // The trap is set once the script prints.
   boost::asio::io_context io;
   const auto deaf = std::make_shared<Child>(io.get_executor());
   std::optional<int> status;

@@ -1,4 +1,4 @@
-// What --daemon takes.
+// The values that --daemon accepts.
 #include "clients/web/daemon_option.hpp"
 
 #include <gmock/gmock.h>

@@ -1,4 +1,4 @@
-// What a client of the Foxglove protocol is sent while its link is slow.
+// Messages to a client of the Foxglove protocol while its link is slow.
 #include "clients/web/foxglove/foxglove_client.hpp"
 
 #include <gtest/gtest.h>
@@ -41,7 +41,7 @@ class SlowSocket final : public WebSocket {
     asio::buffer_copy(into_, asio::buffer(text));
     std::exchange(read_, nullptr)({}, {text.size(), true, true});
   }
-  /// Ends the write under way. False: there is none.
+  /// Ends the write under way. False: no write is under way.
   bool finish_write() {
     if (!written_) return false;
     std::exchange(written_, nullptr)({}, sent.back().size());

@@ -1,4 +1,4 @@
-// By which names a browser may come, and from which pages.
+// The host names and origins that the server accepts from browsers.
 #include "clients/web/names.hpp"
 
 #include <gtest/gtest.h>

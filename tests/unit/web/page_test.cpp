@@ -1,4 +1,4 @@
-// The page's files, and nothing but them.
+// The server serves the page's files and nothing else.
 #include "clients/web/page.hpp"
 
 #include <gmock/gmock.h>

@@ -1,4 +1,4 @@
-// A frame is taken out of the daemon's message without being looked into.
+// A frame is cut out of the daemon's message without parsing it.
 #include <gtest/gtest.h>
 
 #include "clients/web/relayed_frame.hpp"

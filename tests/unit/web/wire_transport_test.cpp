@@ -1,4 +1,4 @@
-// Texts beside the wire: between its messages, the newest alone.
+// Texts between the wire's messages: only the newest is sent.
 #include "clients/web/wire_transport.hpp"
 
 #include <gmock/gmock.h>

@@ -1,4 +1,4 @@
-// All depth encodings side by side, on the golden vectors of tests/golden/depth and on arbitrary
+// All depth encodings compared on the golden vectors of tests/golden/depth and on arbitrary
 // maps.
 #include "proto/depth_encoding.hpp"
 
@@ -26,7 +26,7 @@ std::string bytes_of(const std::string& hex) {
   return bytes;
 }
 
-/// What a frame holds; other encodings' bytes as they are.
+/// Decompressed content of a frame; the bytes of encodings without compression.
 std::string content_of(v1::DepthEncoding encoding, const std::string& bytes) {
   if (encoding != v1::DEPTH_PREDICT_ZSTD) return bytes;
   std::string content(zstd_content_size(bytes).value_or(0), '?');
@@ -34,7 +34,7 @@ std::string content_of(v1::DepthEncoding encoding, const std::string& bytes) {
   return content;
 }
 
-/// A file of tests/golden/depth; make.py there says what its lines are.
+/// A file of tests/golden/depth; make.py there documents its lines.
 struct Golden {
   std::string name;
   std::map<std::string, std::string> lines;

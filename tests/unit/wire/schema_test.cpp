@@ -1,4 +1,4 @@
-// The messages only grow: all that tests/golden/dtact.binpb knows is there under the same numbers
+// The messages only grow: everything in tests/golden/dtact.binpb exists under the same numbers
 // and names, so that programs of that schema and of today's understand each other.
 #include <gmock/gmock.h>
 #include <google/protobuf/descriptor.pb.h>
@@ -29,7 +29,7 @@ std::string oneof_of(const DescriptorProto& message, const FieldDescriptorProto&
   return field.has_oneof_index() ? message.oneof_decl(field.oneof_index()).name() : "";
 }
 
-/// One line for each message, field, and enum value: all that a peer depends on.
+/// One line for each message, field, and enum value: everything that a peer depends on.
 void add_lines(const std::string& scope, const EnumDescriptorProto& one, Lines& lines) {
   for (const auto& value : one.value()) {
     lines.push_back(scope + one.name() + "." + value.name() + " = " +

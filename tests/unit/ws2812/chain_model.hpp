@@ -8,7 +8,7 @@
 
 namespace dtact::hal::ws2812::test {
 
-/// A chain of WS2812B as the datasheet describes it, written without a look at the encoder: it sees
+/// A chain of WS2812B after the datasheet, written independently of the encoder: it reads
 /// levels and durations, measures high pulses, shifts bits, and shows them after a long low. Times
 /// are nanoseconds.
 class ChainModel {
@@ -30,7 +30,7 @@ class ChainModel {
     }
   }
 
-  /// Colours shown since the last latch that brought any; one for each LED reached.
+  /// Colours shown since the last latch that brought any; one for each LED that was reached.
   [[nodiscard]] const std::vector<Rgb>& shown() const { return shown_; }
   /// High pulses that are neither a 0 (200 … 400) nor a 1 (600 … 1000).
   [[nodiscard]] int odd_pulses() const { return odd_; }

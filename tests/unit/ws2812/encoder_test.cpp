@@ -126,7 +126,7 @@ TEST(Ws2812Encoder, AChainShowsWhatWasEncoded) {
   }
 }
 
-// MOSI rests at whatever level a controller leaves it at, before, between and after pictures.
+// MOSI may rest at any level before, between and after pictures, depending on the controller.
 TEST(Ws2812Encoder, AChainShowsWhatWasEncodedWhereverTheLineRests) {
   const std::array<Rgb, 2> first{Rgb{1, 2, 3}, Rgb{255, 128, 0}};
   const std::array<Rgb, 2> second{Rgb{0, 0, 0}, Rgb{255, 255, 255}};
@@ -143,7 +143,7 @@ TEST(Ws2812Encoder, AChainShowsWhatWasEncodedWhereverTheLineRests) {
   }
 }
 
-// Why a chain beyond spidev's buffer is refused and not cut.
+// The reason why a chain beyond spidev's buffer is refused and not cut.
 TEST(Ws2812Encoder, APictureInTwoTransfersIsAnother) {
   const std::array<Rgb, 4> leds{Rgb{1, 2, 3}, Rgb{4, 5, 6}, Rgb{7, 8, 9}, Rgb{10, 11, 12}};
   const SpiFormat format{4, 3.2e6};
@@ -158,7 +158,7 @@ TEST(Ws2812Encoder, APictureInTwoTransfersIsAnother) {
   }
 }
 
-// rpi_ws281x#381: what LEDs make of black when the clock is 0.4 of what was asked for.
+// rpi_ws281x#381: LEDs show white for black when the clock is 0.4 of the requested one.
 TEST(Ws2812Encoder, ASlowClockTurnsBlackIntoWhite) {
   const std::array<Rgb, 8> dark{};
   const std::array<Rgb, 8> white = Light::all({255, 255, 255});
@@ -178,7 +178,7 @@ TEST(Ws2812Encoder, AClockMayFallByTheWindowsWidth) {
     EXPECT_EQ(why_refused({c.bits, fastest * (c.share + 0.001)}), "") << c.bits;
     EXPECT_NE(why_refused({c.bits, fastest * (c.share - 0.001)}), "") << c.bits;
   }
-  EXPECT_EQ(why_refused({8, 0.626 * 8e6}), "");  // what kFix in spi_wire.cpp promises
+  EXPECT_EQ(why_refused({8, 0.626 * 8e6}), "");  // kFix in spi_wire.cpp promises this
 }
 
 }  // namespace

@@ -10,7 +10,7 @@
 
 namespace dtact::hal::ws2812::test {
 
-/// Time that passes by sleeping and by what the other fakes add.
+/// Time that passes by sleeping and by the delays of the other fakes.
 class FakeClock final : public base::Clock {
  public:
   [[nodiscard]] std::int64_t monotonic_ns() const noexcept override { return now; }
@@ -19,7 +19,7 @@ class FakeClock final : public base::Clock {
   std::int64_t now = 1000;
 };
 
-/// An SPI controller that takes the wire's time at a rate of its own choosing.
+/// An SPI controller that takes the wire's time at a rate of its own.
 class FakePort final : public SpiPort {
  public:
   explicit FakePort(FakeClock& clock) : clock_(clock) {}
@@ -39,7 +39,7 @@ class FakePort final : public SpiPort {
   }
   double hz = 3'200'000;
   std::vector<double> odd_hz;              // rates of the transfers to come, before hz again
-  std::function<std::int64_t()> noise_ns;  // what interruptions add to each
+  std::function<std::int64_t()> noise_ns;  // delay of each by interruptions
   int pictures = 0;                        // transfers that were not only zeros
   std::int64_t overhead_ns = 80'000;
   std::size_t bufsiz = 4096;

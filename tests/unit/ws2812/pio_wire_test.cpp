@@ -1,4 +1,4 @@
-// What the wire says of devices that are not the driver's; tests/kernel/ring/pio_ring_test.cpp has
+// The wire's errors for devices that are not the driver's; tests/kernel/ring/pio_ring_test.cpp has
 // the driver's double.
 #include "hal/ws2812/pio_wire.hpp"
 

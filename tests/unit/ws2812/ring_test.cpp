@@ -18,7 +18,7 @@ namespace {
 using testing::ElementsAre;
 using testing::HasSubstr;
 
-/// What a wire was asked for, kept beyond the ring's life.
+/// Requests to a wire, kept beyond the ring's life.
 struct Record {
   std::mutex mutex;
   std::vector<std::vector<Rgb>> writes;
@@ -26,9 +26,9 @@ struct Record {
   std::string refusal;
   std::string note;
   std::string absence;            // why the wire cannot be opened; empty = it can
-  std::atomic<bool> lost{false};  // what failed will not come back by itself
-  std::atomic<int> opened{0};     // wires, until now
-  std::atomic<int> open{0};       // wires, at the moment
+  std::atomic<bool> lost{false};  // the failed device stays unusable
+  std::atomic<int> opened{0};     // wires opened so far
+  std::atomic<int> open{0};       // wires open now
   std::atomic<int> powered{0};    // times the power was switched on
 
   std::vector<std::vector<Rgb>> all() {
@@ -90,7 +90,7 @@ std::unique_ptr<Ring> ring(const std::shared_ptr<Record>& record, const Ws2812Co
   return std::make_unique<Ring>(RingParts{{"recording", "here"}, open, power}, config);
 }
 
-/// Waits generously for what another thread brings about.
+/// Waits generously for an effect of another thread.
 template <typename Condition>
 bool eventually(Condition condition) {
   for (int i = 0; i < 2000; ++i) {
@@ -253,7 +253,7 @@ TEST(Ws2812Ring, AWireThatIsLostIsClosedAndOpenedAnew) {
   record->fail_with("shut down");
   ASSERT_TRUE(eventually([&] { return ours->attend(kRed).message == "/dev/here is gone"; }));
   EXPECT_TRUE(ours->attend(kRed).away);
-  EXPECT_EQ(record->open, 0) << "the device is free for who comes next";
+  EXPECT_EQ(record->open, 0) << "the device is free for another program";
 
   record->fail_with("");
   record->be_absent("");

@@ -139,7 +139,7 @@ TEST(Ws2812SpiWire, ErrorsNameDeviceAndFix) {
   EXPECT_THAT(wire.send({}), HasSubstr("spidev.bufsiz"));
 }
 
-// Like a Raspberry Pi 4's clock whose core falls from 500 to 200 MHz at idle, for one transfer.
+// The clock is off for one transfer, like a Raspberry Pi 4's whose core falls from 500 to 200 MHz.
 TEST(Ws2812SpiWire, ATransferThatWasOffIsSentAgain) {
   Bench bench;
   SpiWire wire = bench.wire();
@@ -148,7 +148,7 @@ TEST(Ws2812SpiWire, ATransferThatWasOffIsSentAgain) {
   EXPECT_EQ(wire.send(kDark), "");
   EXPECT_EQ(bench.port.pictures, 2);
   EXPECT_FALSE(wire.lost());
-  // 2688 bits, and what a call costs here: 0.08 ms.
+  // 2688 bits, and the cost of a call: 0.08 ms.
   EXPECT_EQ(wire.note(),
             "/dev/fakespi: 1 of 2 transfers were off and sent again, the last 2.18 ms for 0.92 ms: "
             "the clock, or a busy machine");
@@ -201,7 +201,7 @@ TEST(Ws2812SpiWire, EachEncodingToleratesItsWindow) {
   }
 }
 
-// Interruptions only lengthen. The light is sent, and said to be, however busy the machine is.
+// Interruptions only lengthen. The light is sent, and reported so, however busy the machine is.
 TEST(Ws2812SpiWire, ABusyMachineIsNotASlowClock) {
   Bench bench;
   std::mt19937 random(1);
@@ -213,7 +213,7 @@ TEST(Ws2812SpiWire, ABusyMachineIsNotASlowClock) {
   EXPECT_THAT(wire.note(), HasSubstr("or a busy machine"));
 }
 
-// When three late ones turn out to be the machine's, the clock may have been off for a moment.
+// When three late ones prove to be the machine's fault, the clock may have been off for a moment.
 TEST(Ws2812SpiWire, AfterAMeasurementTheLightIsSentOnceMore) {
   Bench bench;
   SpiWire wire = bench.wire();
@@ -223,8 +223,8 @@ TEST(Ws2812SpiWire, AfterAMeasurementTheLightIsSentOnceMore) {
   EXPECT_EQ(bench.port.pictures, 4);
 }
 
-// What spidev's ioctl answers once its device is unbound: ESHUTDOWN (spidev_sync in
-// drivers/spi/spidev.c). An error on the bus is none of that.
+// spidev's ioctl answers ESHUTDOWN once its device is unbound (spidev_sync in
+// drivers/spi/spidev.c). An error on the bus is different.
 TEST(Ws2812SpiWire, IsLostWithItsDeviceOnly) {
   Bench bench;
   SpiWire wire = bench.wire();

@@ -25,7 +25,7 @@ struct Control {
   bool moves_by_itself;
   int current = initial;
   Fault fault = Fault::none;
-  int reported = initial;  // what a lying control says
+  int reported = initial;  // the answer of a lying control
 };
 
 std::array<Control, 15> table{{

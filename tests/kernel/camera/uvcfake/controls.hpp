@@ -7,15 +7,15 @@
 
 namespace uvcfake {
 
-/// What a control does instead of what it is told.
+/// A control's fault in place of obeying.
 enum class Fault {
   none,
   refuses,  ///< SET_CUR stalls.
-  ignores,  ///< Takes every value, keeps the old one, and says so when asked.
-  lies      ///< Takes every value, keeps the old one, and says the new one.
+  ignores,  ///< Accepts every value, keeps the old one, and reports the old one.
+  lies      ///< Accepts every value, keeps the old one, and reports the new one.
 };
 
-/// The camera's photometric controls. It comes up as cameras do: everything automatic.
+/// The camera's photometric controls. Like those of most cameras, all start automatic.
 class Controls {
  public:
   /// `name` as in the table of controls.cpp. Throws std::runtime_error, with all names, for
@@ -26,7 +26,7 @@ class Controls {
   /// one of GET_CUR … GET_DEF (0x81 … 0x87); `data` is read or written. Returns the bytes of the
   /// answer; nothing = stall the endpoint.
   std::optional<int> handle(int entity, int selector, int request, std::span<std::uint8_t> data);
-  /// The gain moves by 7 without having been asked, as under an automatic that won't be off.
+  /// The gain moves by 7 without a request, as under an automatic that can't be switched off.
   void drift();
 };
 

@@ -8,7 +8,7 @@ namespace {
 
 using Bytes = std::vector<std::uint8_t>;
 
-/// Little-endian fields after one another.
+/// Writes little-endian fields one after another.
 class Writer {
  public:
   Writer& bytes(std::initializer_list<int> values) {

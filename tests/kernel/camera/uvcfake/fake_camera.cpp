@@ -367,9 +367,9 @@ bool FakeCamera::handle_message() {
   return !broken_;
 }
 
-// By saying that nothing more comes, taking what the controller still sends, and waiting until its
-// port is free. Between the end of vhci-hcd's sending thread and the port's being free, a transfer
-// that waits for that thread is not given back when it is cancelled, so that VIDIOC_STREAMOFF hangs
+// Says that nothing more comes, reads what the controller still sends, and waits until its port is
+// free. Between the end of vhci-hcd's sending thread and the moment when the port is free, a
+// cancelled transfer that waits for that thread is not given back, so that VIDIOC_STREAMOFF hangs
 // (Linux 6.1, vhci_urb_dequeue and vhci_device_unlink_cleanup).
 void FakeCamera::unplug() {
   ::shutdown(socket_.get(), SHUT_WR);

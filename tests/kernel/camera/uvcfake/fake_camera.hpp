@@ -16,12 +16,12 @@
 namespace uvcfake {
 
 struct Options {
-  bool isochronous = false;  ///< As most cameras; else bulk.
+  bool isochronous = false;  ///< Like most cameras; else bulk.
   double fps = 0;            ///< Forced rate; 0 = as negotiated.
   unsigned cut_every = 0;    ///< Every n-th frame is cut in half.
   unsigned flag_every = 0;   ///< Every n-th frame carries the payload header's error bit.
-  std::vector<std::pair<std::string, Fault>> faults;  ///< Of controls, by name.
-  int port = 0;                                       ///< Of the virtual host controller.
+  std::vector<std::pair<std::string, Fault>> faults;  ///< Faults of controls, by name.
+  int port = 0;                                       ///< Port of the virtual host controller.
   std::string serial = "0001";
   std::string folder;  ///< *.jpg (MJPEG) and *.yuv (YUYV), played in the order of their names.
 };
@@ -34,12 +34,12 @@ class FakeCamera {
 
   [[nodiscard]] int socket() const { return socket_.get(); }
   [[nodiscard]] int timer() const { return timer_.get(); }
-  /// Answers one message of the controller. False: the controller has let go.
+  /// Answers one message of the controller. False: the controller has closed the connection.
   [[nodiscard]] bool handle_message();
   /// One frame time has passed.
   void handle_timer();
   void toggle_freeze();
-  /// Goes, and comes back once the controller has let go. Nothing may follow.
+  /// Unplugs, and returns once the controller has closed the connection. The last call.
   void unplug();
   void drift() { controls_.drift(); }
   [[nodiscard]] unsigned sent() const { return sent_; }
@@ -86,7 +86,7 @@ class FakeCamera {
   unsigned sent_ = 0;
   unsigned dropped_ = 0;
   bool flagged_ = false;                   // the frame under way carries the error bit
-  std::span<const std::uint8_t> current_;  // what is left of the frame under way
+  std::span<const std::uint8_t> current_;  // the rest of the frame under way
 };
 
 }  // namespace uvcfake
