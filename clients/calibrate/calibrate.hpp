@@ -9,8 +9,8 @@
 
 namespace dtact::calibrate {
 
-/// Gives `app` dtact-calibrate's name, options and commands; what parses later fills `context`,
-/// which must outlive that.
+/// Gives `app` dtact-calibrate's name, options and commands. Parsing later fills `context`,
+/// which must outlive it.
 void set_up(CLI::App& app, cli::Context& context);
 
 /// The program dtact-calibrate, for main() and tests: runs the command that `arguments` (without

@@ -51,7 +51,7 @@ void add_guided(CLI::App& app, cli::Context& context) {
   add_map_options(*guided, plan->map);
   guided
       ->add_option("--presses", plan->presses,
-                   "After so many presses the calibration is made, where they suffice")
+                   "Number of presses after which the calibration is made, if they suffice")
       ->capture_default_str()
       ->check(CLI::Range(2, 99));
   guided

@@ -16,12 +16,12 @@
 namespace dtact::calibration {
 namespace {
 
-/// Part of the contact that may be black or white before the press is refused.
+/// Share of the contact that may be black or white before the press is refused.
 constexpr double kClipped = 0.01;
-constexpr double kLeans = 0.004;         // per mm; an even press leans by 0.001
-constexpr double kLeftByTheLight = 0.5;  // of that
+constexpr double kLeans = 0.004;         // per mm; an even press has a plane of 0.001
+constexpr double kLeftByTheLight = 0.5;  // share of the plane
 
-/// An image as the depth map shows it: for each of its pixels the nearest of the frame.
+/// An image on the depth map's grid: for each of its pixels the nearest of the frame.
 template <typename Pixel>
 image::Grey8 rectified(const recon::RectifyTable& table, const Pixel& pixel) {
   image::Grey8 part{table.width, table.height, {}};
@@ -53,7 +53,7 @@ void refuse_clipped(const image::Grey8& part, const Contact& contact, double mm_
   }
 }
 
-/// What the frame shows of the image that the lens rectifies; without a lens the frame.
+/// The part of the lens's rectified image that the frame shows; without a lens the frame.
 Crop seen(const std::optional<recon::Lens>& lens, int width, int height, double mm_per_px) {
   if (!lens) return {0, 0, width, height};
   std::vector<std::uint8_t> outside;
@@ -85,7 +85,7 @@ ChosenAsymmetry press_asymmetry_of(const SettledPress& press) {
   return choose_asymmetry(sure_samples(press.map, press.contact), press.contact.ball_radius_mm);
 }
 
-/// Chooses the press's own gain and, where it may, the model's; `settled` becomes the press under
+/// Chooses the press's own gain and, where allowed, the model's; `settled` becomes the press under
 /// it.
 PressChoices choose(const BallPress& press, recon::Model& model, SettledPress& settled) {
   PressChoices chosen{press_asymmetry_of(settled), {}, {}, press.depth_mm};

@@ -14,16 +14,16 @@ namespace {
 
 constexpr double kKnotLevels = 2;  // grey levels from knot to knot
 /// Weight of a bend of one millimetre between three knots, against all pixels off by a millimetre.
-/// Presses of one ball cannot choose it: light scattered in from beyond the contact depends on how
-/// wide the contact is, a chain answers with bends that the gel has not, and LUTs from the
-/// freest to a straight line fit presses that were left out within 1 to 4 µm while they differ by
-/// 50 µm (simulated gels of 1.5, 2 and 3 mm). Left to leave-one-out the freest wins, and a 5 mm
+/// Presses of one ball cannot determine it: light scattered in from beyond the contact depends on
+/// the contact's width, and a chain fits it with bends that the gel does not have. LUTs from the
+/// freest to a straight line fit left-out presses within 1 to 4 µm while they differ by
+/// 50 µm (simulated gels of 1.5, 2 and 3 mm). Leave-one-out selects the freest, and a 5 mm
 /// ball reads 0.027, 0.029 and 0.059 mm off on the three; with this weight 0.031, 0.014 and 0.035,
 /// with a third of it 0.026, 0.020 and 0.040, with a straight line 0.057, 0.022 and 0.029.
 constexpr double kStraight = 0.3;
 constexpr int kGainRounds = 3;
-/// A gain a fifth off one weighs as much as all pixels off by a micrometre, which is what presses
-/// agree within: without that a gain that grows without end would scale all levels alike.
+/// A gain that is off by a fifth weighs as much as all pixels off by a micrometre, the agreement of
+/// presses: without this a gain that grows without end would scale all levels alike.
 constexpr double kNearOne = 2.5e-5;
 /// Weight of a measured depth, in pixels.
 constexpr double kMeasured = 1e5;
@@ -35,7 +35,7 @@ double slope_at(const std::vector<Knot>& knots, double level) {
   return (interpolate(knots, high) - interpolate(knots, low)) / (high - low);
 }
 
-/// How dark the presses are under a gain.
+/// The largest darkening of the presses under a gain.
 double deepest_level(const std::vector<SagProfile>& presses, const std::vector<double>& gain) {
   double deepest = 0;
   for (const SagProfile& press : presses) {
@@ -45,7 +45,7 @@ double deepest_level(const std::vector<SagProfile>& presses, const std::vector<d
   return deepest;
 }
 
-/// What is shown of the LUT, as intervals of indentation, and what is not in between.
+/// Intervals of indentation that the presses show, and the gaps between them.
 std::vector<ChainFit::Gap> gaps_of(const std::vector<SagProfile>& presses, const ChainFit& fit) {
   std::vector<ChainFit::Gap> shown;
   for (const SagProfile& press : presses) {
@@ -66,12 +66,12 @@ std::vector<ChainFit::Gap> gaps_of(const std::vector<SagProfile>& presses, const
   return gaps;
 }
 
-/// One linear solve under a gain. With the fit `before`, for its slopes, the gain's change is
-/// fitted along and added to it.
+/// One linear solve under a gain. With the fit `before`, for its slopes, the change of the gain is
+/// fitted as well and added to it.
 ChainFit solve_once(const std::vector<SagProfile>& presses, const std::vector<double>& gain,
                     const ChainFit* before) {
   const double deepest = deepest_level(presses, gain);
-  if (!(deepest > 0)) throw std::invalid_argument("no ring of any press is darker than untouched");
+  if (!(deepest > 0)) throw std::invalid_argument("no press is darker than the reference");
   const int knots = std::max(2, static_cast<int>(std::ceil(deepest / kKnotLevels)));
   const double step = deepest / knots;
   const auto terms = static_cast<int>(before == nullptr ? 0 : gain.size());
@@ -128,10 +128,10 @@ ChainFit solve_once(const std::vector<SagProfile>& presses, const std::vector<do
 }
 
 constexpr double kSureOfSeen = 0.6;
-constexpr int kChainRounds = 4;  // until the contacts' radii have followed the depths
+constexpr int kChainRounds = 4;  // iterations of radii and depths
 
-/// The sure contact's radius for a depth. One that is far off in the first rounds must not empty or
-/// flood the contact.
+/// The sure contact's radius for a depth. A depth far off in the first rounds must neither empty
+/// nor enlarge the contact much.
 double reach_mm(const PressRings& press, double depth_mm) {
   const double g = std::clamp(depth_mm, 0.0, press.ball_radius_mm);
   const double cut = std::sqrt(g * (2 * press.ball_radius_mm - g));
@@ -231,7 +231,7 @@ LeftOutResidual residual_of(const PressRings& press, const ChainFit& lut) {
     double weight = 0;
     for (const auto& ring : within(press, reach).rings) {
       const double level = gain * ring.level;
-      // Beyond what the others show nothing is claimed.
+      // The LUT is not used beyond the other presses' levels.
       if (level > lut.knots.back().level) continue;
       const double read = interpolate(lut.knots, std::max(0.0, level));
       residuals.rings.push_back({-ring.sag_mm, read + ring.sag_mm, ring.weight});

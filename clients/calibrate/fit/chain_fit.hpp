@@ -8,26 +8,26 @@
 
 namespace dtact::calibration {
 
-/// What one press of a ball shows inside its sure contact: darkening against sag below the lowest
+/// A press of a ball inside its sure contact: darkening against sag below the lowest
 /// point, sag(r) = R − √(R² − r²), in rings about the contact's centre.
 struct SagProfile {
   struct Ring {
     double level = 0;   ///< Mean darkening, grey levels.
-    double sag_mm = 0;  ///< How much shallower than the lowest point.
+    double sag_mm = 0;  ///< Depth below that of the lowest point.
     double weight = 0;  ///< Pixels.
   };
   std::vector<Ring> rings;         ///< From the middle outwards.
   std::optional<double> depth_mm;  ///< Measured depth of the lowest point, if any.
-  /// What the gain is linear in, at this press's place (gain_terms()); empty: no gain is fitted.
+  /// Terms of the gain at this press's position (gain_terms()); empty: no gain is fitted.
   std::vector<double> place = {};
 };
 
-/// One LUT for all presses, and how deep each of them was.
+/// One LUT for all presses, and the depth of each press.
 struct ChainFit {
   std::vector<Knot> knots;       ///< Rising; the first at a darkening above zero.
   std::vector<double> depth_mm;  ///< Depth of each press's lowest point.
   std::vector<double> gain;      ///< See recon::FlatFieldGain::polynomial.
-  /// Indentations that no press shows between two that are shown (or zero), millimetres.
+  /// Indentations between two shown ones (or zero) that no press shows, millimetres.
   struct Gap {
     double from_mm = 0;
     double to_mm = 0;
@@ -35,17 +35,17 @@ struct ChainFit {
   std::vector<Gap> gaps;
 };
 
-/// The LUT M, linear between knots two grey levels apart with M(0) = 0, and a depth g for each
-/// press, so that M(level) = g − sag holds in the rings of all: one linear least-squares solve. No
-/// circle is needed: inside one press only the slope of M is seen, presses of several depths chain
-/// from zero upward, and a press of known depth ties the chain to it. M is kept
-/// straight by a penalty on its bends, and where nothing is seen it goes on straight. Then M is
+/// Fits the LUT M, linear between knots two grey levels apart with M(0) = 0, and a depth g for each
+/// press, so that M(level) = g − sag holds in all rings: one linear least-squares solve. No
+/// circle is needed: one press determines only the slope of M, presses of several depths chain
+/// from zero upward, and a press of known depth fixes the chain. A penalty on its bends keeps M
+/// straight, also where no ring is. Then M is
 /// made to rise.
 ///
-/// With places, darkening counts 1 + gain · place times, and the gain is fitted with the rest, by
-/// Gauss and Newton.
+/// With gain terms, darkening counts 1 + gain · terms times, and the gain is fitted with the rest,
+/// by Gauss and Newton.
 ///
-/// Throws std::invalid_argument when there is no ring.
+/// Throws std::invalid_argument without rings.
 [[nodiscard]] ChainFit fit_chain(const std::vector<SagProfile>& presses);
 
 /// 1 + gain · place, above zero.
@@ -60,25 +60,25 @@ inline constexpr double kBridgedFromZeroMm = 0.4;
 /// surface: 3.04 mm against 3.12 for a 4 mm ball 1.5 mm deep (solved for 2 to 2.5 mm thickness).
 inline constexpr double kContactOfCut = 0.97;
 
-/// A press as the chain takes it: rings of one pixel from the middle to the contact's edge as it is
-/// seen.
+/// A press as input of the chain: rings of one pixel from the middle to the visible edge of the
+/// contact.
 struct PressRings {
   SagProfile all;
   double seen_mm = 0;  ///< Contact radius in the image.
   double ball_radius_mm = 0;
 };
 
-/// What a gain with `terms` factors (0, 2 or 5) is linear in at a press: x, y, x², xy, y² of the
+/// Terms of a gain with `terms` factors (0, 2 or 5) at a press: x, y, x², xy, y² of the
 /// contact's centre, millimetres from the map's.
 [[nodiscard]] std::vector<double> gain_terms(const SettledPress& press, int terms);
 
-/// `depth_mm`: of its lowest point, where it was measured. `terms`: of the gain to be fitted.
+/// `depth_mm` of the lowest point, where measured; `terms` of the gain to be fitted.
 [[nodiscard]] PressRings rings_of(const SettledPress& press, std::optional<double> depth_mm,
                                   int terms);
 
-/// fit_chain() on the sure part of each contact (three fifths of its radius: nearer to the edge its
-/// scattered light tells). The radius follows from the depth, the depth from the chain: both in
-/// turn.
+/// fit_chain() on the sure part of each contact (three fifths of its radius; light scattered from
+/// the ring disturbs the rest). Radius from depth and depth from the chain are found iteratively,
+/// in turn.
 struct PressChain {
   std::vector<SagProfile> sure;
   ChainFit fit;

@@ -26,11 +26,11 @@ struct RadialProfile {
   [[nodiscard]] double at(double radius_mm) const;
 };
 
-/// Beyond this many ball radii from the contact's centre the bright ring has gone: on real images
-/// of a 4 mm ball it ends at about 8 mm.
+/// The bright ring ends at about this many ball radii from the contact's centre: at 8 mm on real
+/// images of a 4 mm ball.
 inline constexpr double kFarField = 2.25;
 
-/// How much higher than its lowest point a ball's surface lies `r` millimetres beside it.
+/// Height of a ball's surface above its lowest point `r` millimetres beside it.
 [[nodiscard]] double sag_mm(double ball_radius_mm, double r) noexcept;
 
 /// Distance of a pixel from the contact's centre, millimetres.
@@ -39,7 +39,7 @@ inline constexpr double kFarField = 2.25;
 [[nodiscard]] RadialProfile radial_profile(const DarkeningMap& map, const Contact& contact,
                                            double reach_mm);
 
-/// Nothing is dark enough to be a contact.
+/// No part is dark enough to be a contact.
 class NoContact : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
@@ -48,11 +48,11 @@ class NoContact : public std::runtime_error {
 /// Finds a ball's contact. The centre is the centroid of the darkening over the connected patch
 /// darker than 0.3 of the peak, weighted with the darkening; the radius is where the mean darkening
 /// about it falls to 3 grey levels, at most 0.85 of the ball's radius (further out the sphere is so
-/// steep that a pixel spans 0.1 mm of depth). Throws saying what to do: NoContact when nothing
-/// is in contact (below 8 grey levels), std::runtime_error when the contact leaves the map.
+/// steep that a pixel spans 0.1 mm of depth). Throws with the fix: NoContact without
+/// contact (below 8 grey levels), std::runtime_error when the contact leaves the map.
 [[nodiscard]] Contact find_contact(const DarkeningMap& map, double ball_radius_mm);
 
-/// How much darker the surroundings without contact became since the reference, grey levels: the
+/// Darkening of the surroundings without contact since the reference, grey levels: the
 /// median over tiles of the far field. 0 unless it is sure, that is: at least 0.5 levels, twice the
 /// spread of the tiles, and the far field shows in at least eight tiles on both sides of the
 /// contact. (The faint outskirts of the bulge are uneven and fail this; a drifted lamp passes.)

@@ -27,37 +27,37 @@ struct DarkeningMap {
   }
 };
 
-/// Gives a model a LUT that answers with the question: its micrometres are the darkening in Q6.
+/// Gives a model an identity LUT: its micrometres are the darkening in Q6.
 void answer_darkening(recon::Model& model);
 
-/// What the LUT of `model` would be asked for: the reconstruction's own rectification, smoothing
-/// and gain, to 1/64 of a grey level, averaged over `frames`. The model's method and LUT play no
-/// part. `reference_q8`: the reference image under the frames' light. Throws std::invalid_argument
-/// when sizes disagree or there is no frame.
+/// The input of the LUT of `model`: the reconstruction's own rectification, smoothing
+/// and gain, to 1/64 of a grey level, averaged over `frames`. The model's method and LUT are not
+/// used. `reference_q8` is the reference image under the frames' light. Throws
+/// std::invalid_argument when sizes disagree or without frames.
 [[nodiscard]] DarkeningMap smoothed_darkening(const recon::Model& model,
                                               std::span<const std::uint16_t> reference_q8,
                                               std::span<const image::Grey8> frames);
 
-/// Reconstructs each frame as a DepthReader does and averages, micrometres; NaN where any was
-/// untrusted. Throws std::invalid_argument as above and as the DepthReader's constructor.
+/// Reconstructs each frame with a DepthReader and averages, micrometres; NaN where any was
+/// untrusted. Throws std::invalid_argument as above and like the DepthReader's constructor.
 [[nodiscard]] std::vector<float> mean_depth_um(const recon::Model& model,
                                                std::span<const std::uint16_t> reference_q8,
                                                std::span<const image::Grey8> frames,
                                                int sharpen_steps = 0);
 
-/// Frames to depth on the calibration's map, as the daemon makes it: plain at full resolution,
+/// Reconstructs frames on the calibration's map like the daemon: plain at full resolution,
 /// sharpened at recon::kSharpenedAt and interpolated.
 class DepthReader {
  public:
-  /// Throws std::invalid_argument as the Reconstructor's constructor.
+  /// Throws std::invalid_argument like the Reconstructor's constructor.
   explicit DepthReader(const std::shared_ptr<const recon::Model>& model, int sharpen_steps = 0);
 
-  /// As Reconstructor::set_reference().
+  /// See Reconstructor::set_reference().
   void set_reference(std::span<const std::uint16_t> reference_q8) noexcept {
     reconstructor_.set_reference(reference_q8);
   }
-  /// Indentation, micrometres, kUntrusted where it is none; of the last frame only, which has the
-  /// size of the calibration's.
+  /// Indentation, micrometres, kUntrusted where untrusted; valid until the next call. The frame has
+  /// the size of the calibration's.
   [[nodiscard]] std::span<const std::int16_t> read(const image::Grey8& frame);
 
  private:

@@ -19,7 +19,7 @@ namespace {
 
 constexpr int kHalves = 8;  // directions of the cut, 45 degrees apart
 
-/// Median and the mean distance from it: the offset that makes the mean absolute error least.
+/// Median and the mean distance from it: the offset that minimises the mean absolute error.
 struct Spread {
   double offset = 0;
   double mean = 0;
@@ -68,9 +68,9 @@ double half_error(const SymmetricPress& press, double angle) {
   });
 }
 
-/// From the even sectors or from the odd ones.
+/// Error of the even sectors with a LUT from the odd ones, or the reverse.
 double sector_error(const SettledPress& press, double turned, bool even) {
-  constexpr double kSector = 45;  // degrees; those that choose among them half as wide
+  constexpr double kSector = 45;  // degrees; half as wide for choosing the gain
   const Contact& contact = press.contact;
   const PixelFilter fitted = [&](int x, int y) {
     return in_even_sector(x - contact.col, y - contact.row, kSector, turned) == even;
@@ -101,7 +101,7 @@ void leave_out(const SettledPress& press, Evaluation& result) {
   result.sector_mae_mm = sectors / 4;
 }
 
-/// Evaluation::dim.
+/// Computes Evaluation::dim.
 double dim_share(const recon::Model& model, const SettledPress& press) {
   constexpr double kWithRing = 1.5;  // contact radii
   const image::Grey8 light = rectified_reference(
@@ -154,14 +154,14 @@ Evaluation read(const recon::Model& model, const SettledPress& press,
   return result;
 }
 
-constexpr int kLevels = 20;  // of a light press, about 0.6 mm: over these the slope is taken
+constexpr int kLevels = 20;  // range of the slope: a light press, about 0.6 mm
 
 double depth_um(const recon::DepthLut& lut, int q6) {
   const int last = static_cast<int>(lut.um.size()) - 1;
   return lut.um[static_cast<std::size_t>(std::clamp(q6 - lut.first_q6, 0, last))];
 }
 
-/// Where a press's contact is and the mean light there; nothing where there is none.
+/// A press's contact and the mean light there; nothing without contact.
 struct LitContact {
   Contact contact;
   double light = 0;
@@ -185,7 +185,7 @@ std::vector<LitContact> lit_contacts(const recon::Model& model, const BallPresse
       }
       if (pixels > 0) found.push_back({settled.contact, sum / pixels});
     } catch (const std::runtime_error&) {
-      continue;  // it shows no contact, and build() has said why it was left out
+      continue;  // no contact; build() has reported the reason
     }
   }
   return found;
@@ -311,7 +311,7 @@ std::vector<std::string> doubts_about(const Calibration& made, const BallPresses
         doubts.push_back(fmt::format("{}: {}", press.name, doubt));
       }
     } catch (const std::runtime_error&) {
-      continue;  // it shows no contact, and build() has said why it was left out
+      continue;  // no contact; build() has reported the reason
     }
   }
   return doubts;

@@ -9,11 +9,11 @@ namespace dtact::calibration {
 // Piecewise linear functions through equally spaced knots, fitted by least squares with a penalty
 // on their bends.
 
-/// Where a place, counted in knots from the first, lies between two of them; places outside belong
-/// to the outermost pair.
+/// The two knots around a position that is counted in knots from the first; positions outside
+/// belong to the outermost pair.
 struct BetweenKnots {
   Eigen::Index below = 0;
-  double part = 0;  ///< From the lower one to the next; outside of 0 … 1 beyond the knots.
+  double part = 0;  ///< Part of the way to the next knot; outside of 0 … 1 beyond the knots.
 };
 [[nodiscard]] BetweenKnots between_knots(double place, Eigen::Index knots);
 
@@ -39,7 +39,7 @@ class LeastSquares {
 
   /// Sum of the equations' weights times their squared factors.
   [[nodiscard]] double trace() const { return matrix_.trace(); }
-  /// The smallest of all solutions where the equations do not determine one.
+  /// The smallest solution where the equations do not determine one.
   [[nodiscard]] Eigen::VectorXd solve() const;
 
  private:

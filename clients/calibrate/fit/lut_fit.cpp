@@ -15,7 +15,7 @@ double bulge_mm(double level, double slope, double c) {
 }
 
 /// The c at which dent and bulge have the same volume, from a radial profile, so that a
-/// ring that is cut off by the image counts whole.
+/// ring that the image cuts off counts as whole.
 double bulge_limit(const RadialProfile& profile, const std::vector<Knot>& knots, double slope) {
   const auto volume = [&](double c) {
     double sum = 0;
@@ -27,7 +27,7 @@ double bulge_limit(const RadialProfile& profile, const std::vector<Knot>& knots,
     }
     return sum;
   };
-  // From a bulge that hardly rises to a LUT that is straight; the greater c, the more bulge.
+  // From a bulge that hardly rises to a straight LUT; a greater c gives more bulge.
   double low = 0.02;
   double high = 10;
   for (int i = 0; i < 50; ++i) {
@@ -37,8 +37,8 @@ double bulge_limit(const RadialProfile& profile, const std::vector<Knot>& knots,
   return low;
 }
 
-constexpr double kBinsPerLevel = 2;  // of the monotone fit
-constexpr int kFewest = 4;           // pixels that make a grey level's vote
+constexpr double kBinsPerLevel = 2;  // in the monotone fit
+constexpr int kFewest = 4;           // pixels that a grey level needs to count
 constexpr std::size_t kRange = 256;  // grey levels
 
 /// Means of (level, sag) over pixels within `reach_mm` of the centre, `per_level` bins a level.
@@ -111,7 +111,7 @@ void make_monotone(std::vector<Knot>& knots) {
 }
 
 /// Step 3. Returns the slope at zero, millimetres a grey level: that of the line to the origin, but
-/// within a factor of four of the contact's own, should a lopsided press put the edge at nothing.
+/// within a factor of four of the contact's own, in case an asymmetric press has its edge at zero.
 double hand_over(std::vector<Knot>& knots, double sure_level, double line_slope) {
   const double slope =
       std::clamp(interpolate(knots, sure_level) / sure_level, line_slope / 4, line_slope * 4);

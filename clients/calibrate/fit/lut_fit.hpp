@@ -9,70 +9,70 @@
 
 namespace dtact::calibration {
 
-/// A point of a LUT: darkening, indentation, and how many pixels say so.
+/// A point of a LUT: darkening, indentation, and the number of pixels.
 struct Knot {
   double level = 0;
   double depth_mm = 0;
   double weight = 0;
 };
 
-/// The indentation of a darkening between the origin and the knots (levels ascending, above 0), and
-/// the last knot's beyond.
+/// The indentation of a darkening, interpolated between the origin and the knots (levels ascending,
+/// above 0); beyond the last knot its own.
 [[nodiscard]] double interpolate(const std::vector<Knot>& knots, double level);
 
-/// A whole LUT from the knots of its pressed side, which rise.
+/// Makes a whole LUT from the knots of its pressed side, which rise.
 ///
-/// - Above the last knot it goes on with `slope_beyond`, millimetres a grey level; two grey levels
-///   of that are vouched for, so that a frame's noise is not beyond the calibration.
+/// - Above the last knot it continues with `slope_beyond`, millimetres a grey level; two grey
+///   levels of that count as covered, so that a frame's noise is not beyond the calibration.
 /// - The bulge: −c·(1 − exp(s·ΔI / c)) for ΔI < 0, with the slope s at zero. A thickening gel
-///   brightens ever faster, so the LUT flattens; c is where the volume of the bulge equals that of
+///   brightens ever faster, so the LUT flattens; at c the volume of the bulge equals that of
 ///   the dent in `profile`, a press, since the gel is incompressible.
 [[nodiscard]] recon::DepthLut make_lut(const std::vector<Knot>& knots, double slope_at_zero,
                                        double slope_beyond, const RadialProfile& profile);
 
-/// What a LUT says of a darkening, grey levels: millimetres; its ends' beyond them.
+/// The LUT's indentation for a darkening in grey levels, millimetres; its ends' beyond them.
 [[nodiscard]] double lut_mm(const recon::DepthLut& lut, double level);
 
-/// What LUTs span: the design's −40 to +110 grey levels.
+/// Range of a LUT: −40 to +110 grey levels.
 inline constexpr int kLutFirstLevel = -40;
 inline constexpr int kLutLastLevel = 110;
 
-/// Which pixels of the depth map a fit may use; empty: all.
+/// Pixels of the depth map that a fit may use; empty: all.
 using PixelFilter = std::function<bool(int x, int y)>;
 
-/// The sure part of a contact, in shares of its radius: beyond it the bright ring's scattered light
-/// tells.
+/// The sure part of a contact, as a share of its radius: beyond it the bright ring's scattered
+/// light disturbs.
 inline constexpr double kSureOfContact = 0.9;
 
-/// What the sure part of a press's contact says: sag = depth − slope · darkening.
+/// Fit of the sure part of a press's contact: sag = depth − slope · darkening.
 struct SagFit {
   double depth_mm = 0;  ///< Depth of the lowest point, with zero darkening = zero depth.
   double slope = 0;     ///< Millimetres a grey level.
 };
 
-/// Step 1 of fit_lut(). Throws as it.
+/// Step 1 of fit_lut(). Throws like fit_lut().
 [[nodiscard]] SagFit fit_sag(const DarkeningMap& map, const Contact& contact,
                              const PixelFilter& use = {});
 
-/// The LUT of one press of a ball, from its image alone.
+/// Fits the LUT of one press of a ball from its image.
 ///
 /// Inside the contact the surface is the ball: its indentation is g − sag(r) with
-/// sag(r) = R − √(R² − r²) and a depth g that nobody measured, so one press shows only the LUT's
+/// sag(r) = R − √(R² − r²) and an unmeasured depth g, so one press shows only the LUT's
 /// slope. The published LUT finds g by putting zero indentation at the contact's edge, which is
 /// biased: the gel's surface is still pressed there, by 0.03 … 0.2 mm depending on its thickness.
-/// What is known without any circle is that an pixel without contact (no darkening) is at zero. So:
+/// Without any circle it is known that a pixel without contact (no darkening) is at zero. So:
 ///
 /// 1. In the sure part of the contact (0.9 of its radius) the sag is a straight line of the
-///    darkening, fitted with one vote a grey level, since shallow and deep places count alike for a
-///    line that is extended to zero. Its value at no darkening is g.
+///    darkening. Each grey level has the same weight in the fit, because shallow and deep pixels
+///    matter equally for a line that is extended to zero. Its value at no darkening is g.
 /// 2. Indentation g − sag over the whole contact, one mean for each half grey level, made monotone
 ///    (pool adjacent violators).
 /// 3. Towards the contact's edge the bright ring's scattered light lowers the darkening, the more
-///    the deeper the press, so what one press shows there is not true of another. From the sure
-///    part's edge down to zero the fit hands over to the straight line to the origin.
-/// 4. make_lut() adds what lies beyond and the bulge, along the line of 1.
+///    the deeper the press, so one press's edge does not apply to another. From the sure
+///    part's edge down to zero the fit blends into the straight line to the origin.
+/// 4. make_lut() adds the range beyond and the bulge, along the line of 1.
 ///
-/// `depth_mm`: of the ball's lowest point, where it was measured; then it is g.
+/// `depth_mm` is the measured depth of the ball's lowest point, if any; then it is g.
 ///
 /// Throws std::runtime_error when the image doesn't darken from the contact's edge to its centre.
 [[nodiscard]] recon::DepthLut fit_lut(const DarkeningMap& map, const Contact& contact,

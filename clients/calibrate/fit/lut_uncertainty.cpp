@@ -11,9 +11,9 @@ namespace dtact::calibration {
 namespace {
 
 constexpr double kZeroLevels = 1;    // grey levels
-constexpr double kRingShare = 0.15;  // of the ring's level, scattered into the contact
+constexpr double kRingShare = 0.15;  // share of the ring's level scattered into the contact
 
-/// None where the press doesn't darken steadily.
+/// Nothing where the press doesn't darken steadily.
 std::optional<SagFit> line_of(const SettledPress& press) {
   try {
     return fit_sag(press.map, press.contact);

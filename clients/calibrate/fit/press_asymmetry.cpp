@@ -11,15 +11,15 @@
 namespace dtact::calibration {
 namespace {
 
-constexpr double kApartMm = 0.1;          // what the map is smoothed by
+constexpr double kApartMm = 0.1;          // smoothing of the map
 constexpr double kKnotLevels = 3;         // grey levels from knot to knot
 constexpr double kStraight = 0.3;         // weight of a knot's bend, in shares of all samples
 constexpr double kMinImprovement = 5e-4;  // mm
 constexpr double kImprovement = 0.05;     // of the left-out error
-/// What is left of a real press goes together over half a millimetre and more, so that a contact
-/// has about so many samples of it.
+/// The residual of a real press is correlated over half a millimetre and more, so that a contact
+/// has about this number of independent samples.
 constexpr double kIndependent = 30;
-/// How far middle and factors are expected from zero: the middle is the centroid, off by at most a
+/// Expected deviation of middle and factors from zero: the middle is the centroid, off by at most a
 /// tenth of a millimetre when the light falls by 5 % a millimetre; a plane of 3 % a millimetre is
 /// more than any light here has. A quadratic of 2 % a square millimetre is an eighth on the rim.
 constexpr double kMiddleMm = 0.1;
@@ -31,7 +31,7 @@ Eigen::Index terms_of(AsymmetryOrder order) { return 2 * static_cast<Eigen::Inde
 
 std::array<double, 4> terms_at(double x, double y) { return {x, y, x * x - y * y, 2 * x * y}; }
 
-/// A press's gain with the LUT that was fitted along, as indentation less the press's depth.
+/// A press's gain with the LUT fitted together with it, as indentation less the press's depth.
 struct Fit {
   PressAsymmetry gain;
   Eigen::VectorXd knots;  ///< kKnotLevels apart, the first at no darkening.
@@ -47,17 +47,17 @@ double darkening(const PressAsymmetry& gain, const PressSample& s) {
   return std::max(0.0, gain.at(s.x_mm, s.y_mm) * s.level);
 }
 
-/// LUT minus sphere, but for the press's depth.
+/// LUT minus sphere, without the press's depth.
 double error_of(const Fit& fit, const PressSample& s, double ball) {
   const double r = std::hypot(s.x_mm - fit.gain.right_mm, s.y_mm - fit.gain.down_mm);
   return fit.depth_at(darkening(fit.gain, s)) + sag_mm(ball, r);
 }
 
-/// One round: knots anew, gain and middle moved along their slopes at `before`.
+/// One iteration: solves the knots, and moves gain and middle along their slopes at `before`.
 Fit solve(std::span<const PressSample> samples, double ball, const Fit* before,
           const PressAsymmetry& start, double mean_square) {
   const auto terms = before == nullptr ? 0 : terms_of(start.order);
-  const auto middle = terms > 0 ? 2 : 0;  // what it gains alone is nothing, without a gain
+  const auto middle = terms > 0 ? 2 : 0;  // without a gain the middle alone gains nothing
   double deepest = kKnotLevels;
   for (const PressSample& s : samples) deepest = std::max(deepest, darkening(start, s));
   const auto knots = static_cast<Eigen::Index>(std::ceil(deepest / kKnotLevels)) + 1;
@@ -120,7 +120,7 @@ Fit fit_jointly(std::span<const PressSample> samples, double ball, AsymmetryOrde
   return fit;
 }
 
-/// The mean distance from the errors' median: nobody measured the press's depth.
+/// The mean distance from the errors' median, because the press's depth is not measured.
 double mean_error(const Fit& fit, std::span<const PressSample> samples, double ball) {
   std::vector<double> errors;
   errors.reserve(samples.size());

@@ -16,17 +16,17 @@
 namespace dtact::calibration {
 namespace {
 
-/// Presses of one ball agree among themselves within a micrometre or two however the gel scatters
+/// Presses of one ball agree within a micrometre or two however the gel scatters
 /// light; a ball of another radius is off by more: 0.012 to 0.036 mm on depths about 0.8 in gels
-/// of 1.5 to 3 mm (simulator). The share that covers them.
+/// of 1.5 to 3 mm (simulator). This share covers them.
 constexpr double kOtherShape = 0.05;
 
-/// What a refusal ends with, so that nobody looks in vain for a press that was made but not used.
+/// The end of a refusal, so that the user does not search for a press that was made but not used.
 std::string name_left_out(const std::vector<std::string>& left_out) {
   return left_out.empty() ? "" : fmt::format("; left out: {}", fmt::join(left_out, "; "));
 }
 
-/// The presses in which a contact is found; the others' reasons go to `left_out`.
+/// The presses with a contact; the others' reasons go to `left_out`.
 std::vector<SettledPress> settle_all(const recon::Model& model, BallPresses& set,
                                      std::vector<std::string>& left_out) {
   std::vector<SettledPress> presses;
@@ -49,8 +49,8 @@ std::vector<SettledPress> settle_all(const recon::Model& model, BallPresses& set
   return presses;
 }
 
-/// A press that is not too faint as a share of the light and yet lost or found elsewhere: its name
-/// and why; empty: none. What is dark has grey levels that are a great share of its light.
+/// Name and reason of a press that is not too faint as a share of the light and yet lost or found
+/// elsewhere; empty: none. In dark parts a few grey levels are a large share of the light.
 std::string lost_to_the_share(const recon::Model& uniform, const BallPresses& set,
                               const std::vector<SettledPress>& seen) {
   for (std::size_t p = 0; p < seen.size(); ++p) {
@@ -71,14 +71,14 @@ std::string lost_to_the_share(const recon::Model& uniform, const BallPresses& se
   return {};
 }
 
-/// One gain, and how the presses meet each other under it.
+/// One gain, and the agreement of the presses under it.
 struct Trial {
   const std::vector<SettledPress>* presses = nullptr;
   recon::GainShape shape = recon::GainShape::none;
   std::vector<PressRings> rings;
   ChainFit fit;  ///< Fit to all presses.
   LeaveOneOut left_out;
-  std::vector<double> errors_mm;  ///< For each press left out; NaN: unknown.
+  std::vector<double> errors_mm;  ///< Error of each press when left out; NaN: unknown.
 };
 
 std::string name_of(const Trial& trial) {
@@ -104,7 +104,7 @@ Trial try_gain(const std::vector<SettledPress>& presses, const BallPresses& set,
   return trial;
 }
 
-/// Mean of `value(press)` over the presses of which every trial says something, and its standard
+/// Mean of `value(press)` over the presses for which every trial has a value, and its standard
 /// error.
 struct Mean {
   double mean = 0;
@@ -128,8 +128,8 @@ Mean mean_over(const std::vector<Trial>& trials, const Value& value) {
   return {mean, std::sqrt(std::max(0.0, squares / n - mean * mean) / (n - 1))};
 }
 
-/// The first trial that predicts no worse than the best by more than one standard error of their
-/// difference (Breiman et al. 1984, section 3.4.3).
+/// The first trial whose prediction is at most one standard error of their difference worse than
+/// the best (Breiman et al. 1984, section 3.4.3).
 std::size_t simplest(const std::vector<Trial>& trials, std::vector<PressReport::Gain>& report) {
   std::size_t best = 0;
   for (std::size_t t = 0; t < trials.size(); ++t) {
@@ -149,7 +149,7 @@ std::size_t simplest(const std::vector<Trial>& trials, std::vector<PressReport::
   return chosen;
 }
 
-/// The darkening at which the first of some LUTs that reaches so far reads a depth.
+/// The darkening at which the first LUT that reaches the depth reads it.
 double level_at(const std::vector<ChainFit>& luts, double depth_mm) {
   for (const ChainFit& lut : luts) {
     Knot below;
@@ -164,7 +164,7 @@ double level_at(const std::vector<ChainFit>& luts, double depth_mm) {
   return luts.front().knots.back().level;
 }
 
-/// How much the LUT at a depth moves with the presses that make it: the jackknife's standard error
+/// Change of the LUT at a depth with the presses that make it: the jackknife's standard error
 /// (Efron and Tibshirani 1993, section 11.2), millimetres.
 double jackknife_mm(const LeaveOneOut& left_out, double depth_mm) {
   double n = 0;
@@ -183,8 +183,8 @@ double jackknife_mm(const LeaveOneOut& left_out, double depth_mm) {
   return std::sqrt(std::max(0.0, (n - 1) / n * (squares - sum * sum / n)));
 }
 
-/// What the ring's scattered light may make of the LUT, the mean over the presses: presses of one
-/// ball agree whatever it does.
+/// Influence of the ring's scattered light on the LUT, the mean over the presses: presses of one
+/// ball agree in spite of it.
 double ring_uncertainty_mm(const Trial& trial) {
   const Knot& deepest = trial.fit.knots.back();
   double sum = 0;
@@ -194,9 +194,9 @@ double ring_uncertainty_mm(const Trial& trial) {
   return sum / static_cast<double>(trial.presses->size());
 }
 
-/// At each indentation bin: how far left-out presses are from the known shape, how much the LUT
-/// moves with the presses that make it, what another shape would read otherwise, and what the ring
-/// may have done.
+/// At each indentation bin: the left-out presses' distance from the known shape, the LUT's change
+/// with the presses that make it, the error for another shape, and the influence of the
+/// ring.
 std::vector<recon::Model::Uncertainty> uncertainty_of(const LeaveOneOut& left_out, double ring_mm) {
   struct Bin {
     double depth = 0;
@@ -260,7 +260,7 @@ Calibration build(const BallPresses& presses, PressReport* report) {
         "the map is dark, --crop leaves it out",
         lost);
   } else {
-    // With one gain a faint press may be seen and with the other not: both get what both see.
+    // A faint press may be found with one gain and not with the other: both get the common presses.
     lit = settle_all(uniform, set, found.left_out);
     seen = settle_all(plain, set, found.left_out);
   }
@@ -284,7 +284,7 @@ Calibration build(const BallPresses& presses, PressReport* report) {
   auto model =
       std::make_shared<recon::Model>(chosen.shape == recon::GainShape::none ? plain : uniform);
   model->gain.polynomial = fit.gain;
-  // The bulge of the deepest press is the one seen best.
+  // The bulge of the deepest press is the most visible one.
   const auto deepest =
       static_cast<std::size_t>(std::ranges::max_element(fit.depth_mm) - fit.depth_mm.begin());
   const SettledPress& press = (*chosen.presses)[deepest];

@@ -28,7 +28,7 @@ Circle through(Pixel a, Pixel b, Pixel c) {
   const double cx = c.col - a.col;
   const double cy = c.row - a.row;
   const double cross = 2 * (bx * cy - by * cx);
-  if (cross == 0) {  // on one line: the two that are furthest apart
+  if (cross == 0) {  // on one line: use the two farthest apart
     const std::array<Circle, 3> pairs{through(a, b), through(a, c), through(b, c)};
     return *std::ranges::max_element(pairs, {}, &Circle::radius);
   }
@@ -77,7 +77,7 @@ std::vector<Pixel> largest_patch(const std::vector<int>& levels, int width, int 
   return largest;
 }
 
-/// Fills what no pixel said from the neighbours that some did; the ends are held.
+/// Fills entries without pixels by interpolation between their neighbours; the ends are held.
 void fill_gaps(std::vector<double>& depth, const std::vector<int>& count) {
   const auto known = [&](std::size_t i) { return count[i] > 0; };
   std::size_t before = 0;
@@ -97,7 +97,7 @@ void fill_gaps(std::vector<double>& depth, const std::vector<int>& count) {
 
 Circle enclosing_circle(std::vector<Pixel> points) {
   if (points.empty()) return {};
-  // Only the ends of each row can lie on the circle, and there are few of them.
+  // Only the ends of each row can be on the circle, and they are few.
   std::ranges::sort(
       points, [](Pixel a, Pixel b) { return a.row != b.row ? a.row < b.row : a.col < b.col; });
   std::vector<Pixel> ends;
@@ -157,7 +157,7 @@ recon::DepthLut fit_published(const image::Grey8& reference, const image::Grey8&
     }
   }
   for (std::size_t i = 0; i < entries; ++i) depth[i] /= std::max(1, count[i]);
-  // Beyond the circle's greatest darkening there is nothing to fill.
+  // Nothing is filled beyond the circle's greatest darkening.
   const auto last = std::ranges::find_if(count.rbegin(), count.rend(), [](int n) { return n > 0; });
   depth.resize(static_cast<std::size_t>(count.rend() - last));
   fill_gaps(depth, count);

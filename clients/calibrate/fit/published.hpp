@@ -22,17 +22,17 @@ struct Pixel {
 /// The smallest circle that holds all points (Welzl 1991, without the recursion). No points: empty.
 [[nodiscard]] Circle enclosing_circle(std::vector<Pixel> points);
 
-/// The contact as the published method sees it: the smallest circle about the largest patch of
+/// The contact in the published method: the smallest circle about the largest patch of
 /// pixels darker than the reference by more than 3 grey levels, centre and radius cut to whole
-/// pixels; radius 0 when there is none. `reference`, `ball`: the depth map's part of the images.
+/// pixels; radius 0 without a patch. `reference`, `ball`: the depth map's part of the images.
 [[nodiscard]] Circle published_circle(const image::Grey8& reference, const image::Grey8& ball);
 
-/// The single-image LUT as it was published, with its weaknesses, to compare with:
+/// The single-image LUT as published, with its weaknesses, for comparison:
 ///
-/// - The difference is unsigned: what is brighter than the reference counts as 0.
+/// - The difference is unsigned: a pixel brighter than the reference counts as 0.
 /// - The contact is published_circle(); the indentation at its edge is zeroed.
-/// - An entry is the mean depth of the circle's pixels with that whole difference. Where none has
-///   it, the entry is interpolated. (The authors average three colour channels and keep the third
+/// - An entry is the mean depth of the circle's pixels with exactly that difference. Without pixels
+///   the entry is interpolated. (The authors average three colour channels and keep the third
 ///   of the pixels whose mean is whole; luma is whole everywhere.)
 /// - At run time the entry at the threshold of 2 grey levels is subtracted from all and nothing is
 ///   below zero; both are done here once for the LUT. The LUT has 64 equal entries for each

@@ -14,10 +14,10 @@
 namespace dtact::calibration {
 namespace {
 
-/// Standard deviation of the Gaussian that two 7×7 filters (σ = 1.4 each, OpenCV's choice for that
-/// size) amount to, pixels.
+/// Standard deviation of one Gaussian equal to two 7×7 filters (σ = 1.4 each, OpenCV's choice for
+/// that size), pixels.
 constexpr double kTwoFilters = 1.98;
-constexpr int kLastLevel = 250;  // of the LUT: a line has no end of its own
+constexpr int kLastLevel = 250;  // end of the LUT: a line has none of its own
 
 /// slope = k · distance + b, least squares.
 struct Line {
@@ -33,7 +33,7 @@ class LineFit {
     ds_ += distance * slope;
     s_ += slope;
   }
-  /// Throws std::runtime_error when all distances are one.
+  /// Throws std::runtime_error when all distances are equal.
   [[nodiscard]] Line line() const {
     const double determinant = dd_ * n_ - d_ * d_;
     if (!(determinant > 1e-9 * dd_ * n_)) {
@@ -79,7 +79,7 @@ void add_press(const image::Grey8& reference, const image::Grey8& ball, const st
   }
 }
 
-/// The presses in which find_contact() finds one; the published circle is content with less.
+/// The presses in which find_contact() finds a contact; the published circle needs less.
 std::vector<SettledPress> settle_all(const recon::Model& model, const BallPresses& set) {
   std::vector<SettledPress> presses;
   for (const BallPresses::Press& press : set.presses) {
@@ -127,7 +127,7 @@ Calibration build_regression(const BallPresses& set, double centre_x_mm, double 
                  .centre_y_mm = centre_y_mm,
                  .per_mm = k / b};
   model->smoothing_px = kTwoFilters;
-  // Levels increased by the gain are looked up further on; brighter than the reference is 0.
+  // Levels that the gain increases are looked up further on; brighter than the reference is 0.
   model->lut.first_q6 = 0;
   for (int q6 = 0; q6 <= kLastLevel * recon::kEntriesPerLevel; ++q6) {
     model->lut.um.push_back(static_cast<std::int16_t>(

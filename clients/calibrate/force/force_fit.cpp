@@ -56,7 +56,7 @@ void check(const std::vector<Pair>& pairs) {
   }
 }
 
-/// The readings as a gel of one thickness would answer the contacts.
+/// The forces of the contacts on a gel of one thickness.
 class Readings {
  public:
   Readings(const std::vector<Pair>& pairs, double thickness_mm) : pairs_(pairs) {
@@ -67,7 +67,7 @@ class Readings {
     }
   }
 
-  /// Modulus, and modulus times zero. `left_out`: a pair that has no part in it.
+  /// Modulus, and modulus times zero. Excludes the pair `left_out`.
   [[nodiscard]] Eigen::Vector2d fit(std::size_t left_out = SIZE_MAX) const {
     Eigen::Matrix2d normal = Eigen::Matrix2d::Zero();
     Eigen::Vector2d right = Eigen::Vector2d::Zero();

@@ -8,14 +8,14 @@
 
 namespace dtact::force {
 
-/// A contact and what a scale said of it.
+/// A contact and the scale's reading.
 struct Pair {
-  std::string name;  ///< For messages: where it is from.
+  std::string name;  ///< Source, for messages.
   recon::CellMap contact;
   double newtons = 0;
 };
 
-/// Fewer pairs determine three numbers and their error too badly.
+/// Three numbers and their error need at least this number of pairs.
 inline constexpr int kMinPairs = 6;
 
 struct Fit {
@@ -28,10 +28,10 @@ struct Fit {
 /// around 0 ± 0.03 mm and thicknesses around 2 mm ± 35 % are preferred.
 ///
 /// Throws std::invalid_argument with the fix when there are fewer than kMinPairs, contacts are of
-/// different map sizes, one is missing or cut off or has no positive reading, pairs that are left
-/// out are missed by more than a quarter, or the modulus is none that silicones have: 0.02 … 2 MPa
-/// (the public study's gels: 0.04 … 0.27). Readings in grams give 102 times as much, in kilograms a
-/// tenth.
+/// different map sizes, one is missing or cut off or has no positive reading, left-out pairs
+/// are missed by more than a quarter, or the modulus is outside the range of silicones: 0.02 … 2
+/// MPa (the public study's gels: 0.04 … 0.27). Readings in grams give 102 times as much, in
+/// kilograms a tenth.
 [[nodiscard]] Fit fit_force(const std::vector<Pair>& pairs,
                             std::optional<double> thickness_mm = std::nullopt);
 

@@ -22,7 +22,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Pixels darker than the LUT reaches that noise may leave, as the daemon allows them.
+/// Pixels beyond the LUT that noise may cause, as in the daemon.
 constexpr int kBeyondPixels = 64;
 constexpr std::string_view kRecording = ".mcap";
 
@@ -31,8 +31,8 @@ bool number(std::string_view text, auto& value) {
   return parsed.ec == std::errc() && parsed.ptr == text.data() + text.size();
 }
 
-/// Where the path of a recording ends in `frames`, before the range of its frames; npos: these are
-/// images, also those in a folder whose name ends like a recording's.
+/// Position in `frames` where the path of a recording ends, before the range of its frames; npos
+/// for images, also in a folder whose name ends like a recording's.
 std::size_t end_of_recording(const std::string& frames) {
   const auto found = frames.rfind(kRecording);
   if (found == std::string::npos) return found;
@@ -55,7 +55,7 @@ bool same_sharpening(const recon::Model& a, const recon::Model& b) {
          });
 }
 
-// Depth by both calibrations is the same; what either says of force does not matter.
+// Whether depth is the same with both calibrations, whatever their force.
 bool same_depth(const recon::Model& a, const recon::Model& b) {
   return a.method == b.method && a.mm_per_px == b.mm_per_px && a.smoothing_px == b.smoothing_px &&
          a.lut.first_q6 == b.lut.first_q6 && a.lut.um == b.lut.um &&

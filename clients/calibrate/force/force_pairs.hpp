@@ -12,7 +12,7 @@
 
 namespace dtact::force {
 
-/// What the user gave: frames, and what the scale said while they were taken.
+/// The user's input: frames, and the scale's reading while they were taken.
 struct Reading {
   std::string frames;  ///< A PNG file, a folder of them, or a recording: press.mcap[:frame[:end]].
   double value = 0;    ///< The scale's reading.
@@ -38,7 +38,7 @@ class ContactReader {
   /// measured. Throws std::runtime_error when the frames cannot be read, are of another size or,
   /// recorded, of another calibration, or reach deeper than the calibration covers.
   [[nodiscard]] Pair measure(const std::string& frames) const;
-  /// The same of pictures at hand.
+  /// The same for pictures in memory.
   [[nodiscard]] Pair measure(std::span<const image::Grey8> frames, const std::string& name) const;
 
  private:

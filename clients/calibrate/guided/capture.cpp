@@ -15,21 +15,21 @@ namespace dtact::ctl::guided {
 namespace {
 
 constexpr std::chrono::milliseconds kFrameWait{100};
-/// Frames that must agree before the first is taken. A press moving down slower than 0.2 mm a
+/// Frames that must agree before the first is used. A press that moves down slower than 0.2 mm a
 /// second passes as still; the drift of the captured frames reveals it.
 constexpr int kSettleFrames = 10;
-/// Grey levels a cell may move while it counts as still (about 0.05 mm). The most noise that the
-/// daemon calls tolerable, 2.5 a pixel, moves the worst of all cells by 1.
+/// Change of a cell that counts as still, grey levels (about 0.05 mm). The largest noise that the
+/// daemon tolerates, 2.5 a pixel, moves the worst of all cells by 1.
 constexpr double kStill = 1.5;
 /// Grey levels between the means of the first and the last half.
 constexpr double kDrift = 0.5;
-/// A press that differs less from the one before, somewhere, is the same.
+/// A press that differs less from the one before in every cell is the same.
 constexpr double kSamePress = 2.0;
 constexpr int kBrighterFrames = 5;
-/// Waits without a frame until the user gets a message, two seconds.
+/// Waits without a frame before the user gets a message, two seconds.
 constexpr int kMisses = 20;
 
-/// Ends a wait by the frames' times; where none come, by how often that was.
+/// Ends a wait by the frames' times, or without frames by the number of waits.
 class Timeout {
  public:
   explicit Timeout(double seconds) : seconds_(seconds) {}
@@ -59,7 +59,7 @@ CellMeans mean_of(const std::vector<CellMeans>& all, std::size_t first, std::siz
   return mean;
 }
 
-/// From the differences of neighbouring frames, at every 61st pixel.
+/// Noise from the differences of neighbouring frames, at every 61st pixel.
 double noise_of(const std::vector<image::Grey8>& frames) {
   double sum = 0;
   double count = 0;

@@ -12,10 +12,10 @@
 
 namespace dtact::ctl::guided {
 
-/// Frames of a surface that held still.
+/// Frames of a surface that stood still.
 struct SteadyFrames {
   std::vector<image::Grey8> frames;
-  CellMeans cells;          ///< Mean of all.
+  CellMeans cells;          ///< Mean of all frames.
   double drift_levels = 0;  ///< The largest change of a cell from the first half to the last.
   double noise_levels = 0;  ///< Standard deviation of a pixel from frame to frame.
 };
@@ -26,7 +26,7 @@ struct Ended {
   Why why = Why::quit;
 };
 
-/// Frames could not be taken in time; the sentence says why.
+/// Frames could not be taken in time; what() names the reason.
 class CaptureTimeout : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
@@ -38,42 +38,42 @@ struct ReferenceInContact {};
 /// A frame and its cells.
 struct ObservedFrame {
   image::Grey8 image;
-  std::int64_t time_ns = 0;  ///< Its capture, of the daemon's clock.
+  std::int64_t time_ns = 0;  ///< Time of capture on the daemon's clock.
   CellMeans cells;
 };
 
-/// Watches the sensor's frames and takes some where they hold still. It goes by what the frames
-/// show and by their own times, so that a sensor played faster or slower is taken alike.
+/// Watches the sensor's frames and takes some while they stand still. It uses the
+/// frames' contents and their own times, so that a faster or slower sensor gives the same.
 class Capture {
  public:
   struct Rules {
-    double timeout_s = 60;  ///< By the frames' times; then CaptureTimeout.
+    double timeout_s = 60;  ///< In the frames' times; then throws CaptureTimeout.
   };
-  /// `shown` is called with each usable frame and a few words about it.
+  /// Calls `shown` with each usable frame and a short description.
   Capture(Sensor& sensor, Console& console, const CellGrid& grid, const Rules& rules,
           std::function<void(const ObservedFrame&, const std::string&)> shown);
 
-  /// Frames have to come under this light from now on (r, g, b of each LED after brightness).
+  /// Frames must have this light from now on (r, g, b of each LED after brightness).
   void expect_light(std::vector<std::uint8_t> leds) { leds_ = std::move(leds); }
 
   /// The next usable frame; null when none came in 100 ms. Throws Ended on Ctrl-C,
   /// std::runtime_error when the light is another.
   [[nodiscard]] const ObservedFrame* next();
 
-  /// Waits for `count` frames in a row that hold still. Throws CaptureTimeout, Ended and as next().
+  /// Waits for `count` consecutive still frames. Throws CaptureTimeout, Ended and like next().
   [[nodiscard]] SteadyFrames reference(int count);
-  /// Waits for an object in contact, at another place or depth than in `last` (empty: none), and
+  /// Waits for an object in contact, at another position or depth than in `last` (empty: none), and
   /// captures it. A line typed meanwhile captures the press as it is. Throws
   /// ReferenceInContact too.
   [[nodiscard]] SteadyFrames press(int count, const CellMeans& reference, const CellMeans& last);
 
  private:
-  /// What speaks against a frame; empty: nothing.
+  /// Objection to a frame; empty: none.
   using Objection = std::function<std::string(const ObservedFrame&)>;
-  /// `forcible`: a line typed meanwhile takes what there is.
+  /// `forcible`: a line typed meanwhile takes the present frames.
   [[nodiscard]] SteadyFrames hold(int count, bool forcible, const Objection& objection);
   [[nodiscard]] std::string trouble();
-  /// A line was typed by a person who waits. Throws Ended.
+  /// Whether a waiting user typed a line. Throws Ended.
   [[nodiscard]] bool line_typed();
 
   Sensor& sensor_;

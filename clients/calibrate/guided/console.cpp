@@ -78,7 +78,7 @@ StreamConsole::~StreamConsole() {
 
 void StreamConsole::fetch() {
   const std::size_t lines = in_.fetch();
-  // The terminal has echoed them: the cursor is that far below the live lines.
+  // The terminal has echoed them: the cursor is as many lines below the live lines.
   if (live_lines_ > 0) live_lines_ += lines;
 }
 
@@ -113,7 +113,7 @@ void StreamConsole::live(const Scene& scene) {
   }
   if (lines.empty()) return;
   clear_live();
-  // A line that is too long for the terminal must not become two.
+  // Disables wrapping: a line that is too long for the terminal must not become two.
   out_ << "\x1b[?7l";
   for (std::size_t i = 0; i < lines.size(); ++i) out_ << (i > 0 ? "\n" : "") << lines[i];
   out_ << "\x1b[?7h" << std::flush;
@@ -122,7 +122,7 @@ void StreamConsole::live(const Scene& scene) {
 
 void StreamConsole::clear_live() {
   if (live_lines_ == 0) return;
-  fetch();  // what was typed meanwhile has moved the cursor
+  fetch();  // input meanwhile has moved the cursor
   out_ << '\r';
   if (live_lines_ > 1) out_ << "\x1b[" << live_lines_ - 1 << 'A';
   out_ << "\x1b[J";

@@ -10,30 +10,30 @@
 
 namespace dtact::ctl::guided {
 
-/// A press that was taken, on the depth map.
+/// A captured press, on the depth map.
 struct CapturedPress {
   std::string name;
   double col = 0;  ///< The contact's middle, pixels.
   double row = 0;
   double radius_px = 0;
-  double depth_mm = 0;  ///< Depth of its lowest point: fitted, else by the contact's width.
+  double depth_mm = 0;  ///< Depth of its lowest point: fitted, else from the width.
 };
 
-/// What the user typed since it was last asked.
+/// The user's input since the last call.
 struct Typed {
   enum class Kind { nothing, line, end, interrupted };
   Kind kind = Kind::nothing;
   std::string line;  ///< Without blanks around it.
 };
 
-/// Lines of a descriptor, which is not owned; nothing here waits.
+/// Lines of a descriptor, which is not owned; no call waits.
 class LineInput {
  public:
   explicit LineInput(int descriptor) : descriptor_(descriptor) {}
 
-  /// Reads what lies ready. Returns how many lines ended in it.
+  /// Reads available input. Returns the number of lines that ended in it.
   std::size_t fetch();
-  /// The next line of what was read.
+  /// The next line read.
   [[nodiscard]] Typed take();
 
  private:
@@ -42,35 +42,35 @@ class LineInput {
   bool ended_ = false;
 };
 
-/// What the user may type.
+/// An input that the user may type.
 struct Answer {
   std::string key;    ///< A letter; empty: Enter alone.
-  std::string words;  ///< What it does.
+  std::string words;  ///< Description.
 };
 
 inline const Answer kQuit{"q", "end the session"};
 
-/// What the user is asked.
+/// A question to the user.
 struct Prompt {
-  std::string text;  ///< Empty: nothing but the answers.
+  std::string text;  ///< Empty: only the answers.
   std::vector<Answer> answers;
 };
 
 /// The prompt as lines: the text, and below it each answer behind its key in brackets.
 [[nodiscard]] std::string text_of(const Prompt& prompt);
 
-/// What stands before the user until the next takes its place.
+/// The display for the user until the next one.
 struct Scene {
-  const image::Grey8* picture = nullptr;  ///< The sensor now, the map's part; null: as before.
+  const image::Grey8* picture = nullptr;  ///< The sensor's map now; null: unchanged.
   double mm_per_px = 0;                   ///< The picture's scale.
   std::string words;                      ///< About the picture.
   Prompt prompt;
   std::vector<CapturedPress> presses;
-  double covered_mm = 0;     ///< How deep the LUT of these presses reaches; 0: there is none.
+  double covered_mm = 0;     ///< Depth that the LUT of these presses covers; 0: no LUT.
   int presses_required = 0;  ///< Number of presses for the calibration.
 };
 
-/// Where the session speaks with its user; the tests play one.
+/// The session's connection to its user; the tests play one.
 class Console {
  public:
   Console() = default;
@@ -78,24 +78,24 @@ class Console {
   Console& operator=(const Console&) = delete;
   virtual ~Console() = default;
 
-  /// A person watches: live pictures are drawn, and a line may come at any time. Else lines lie
-  /// ready, each for one prompt.
+  /// Whether a person watches: live pictures are drawn, and a line may come at any time. Otherwise
+  /// each prompt reads one prepared line.
   [[nodiscard]] virtual bool interactive() const = 0;
-  /// The user sits at this machine's terminal; else paths and commands mean nothing to them.
+  /// Whether the user is at this machine's terminal; otherwise paths and commands are left out.
   [[nodiscard]] virtual bool at_terminal() const { return true; }
-  /// Does not wait.
+  /// The user's input; does not wait.
   [[nodiscard]] virtual Typed typed() = 0;
-  /// Ctrl-C was pressed.
+  /// Whether Ctrl-C was pressed.
   [[nodiscard]] virtual bool interrupted() const = 0;
-  /// One or several lines, to stay.
+  /// Prints one or several lines that stay.
   virtual void say(const std::string& text) = 0;
-  /// A picture of a press, to stay.
+  /// Prints a picture of a press that stays.
   virtual void keep(const image::Grey8& picture) = 0;
-  /// Nothing where no person watches.
+  /// Shows the scene where a person watches.
   virtual void live(const Scene& scene) = 0;
 };
 
-/// Standard input and output, or what a test puts in their places.
+/// Standard input and output, or a test's replacements.
 class StreamConsole : public Console {
  public:
   /// `in`: a descriptor, not owned. `interactive`: both are a terminal.
@@ -110,7 +110,7 @@ class StreamConsole : public Console {
   void live(const Scene& scene) override;
 
  private:
-  /// Reads what lies ready.
+  /// Reads available input.
   void fetch();
   void clear_live();
 
@@ -121,7 +121,7 @@ class StreamConsole : public Console {
   std::size_t live_lines_ = 0;
 };
 
-/// Speaks with a program that shows the session to a person, in lines of JSON
+/// Connects to a program that shows the session to a person, in lines of JSON
 /// (clients/common/guided.proto).
 class JsonConsole : public Console {
  public:

@@ -28,7 +28,7 @@ std::vector<CapturedPress> contacts_of(const PressImages& images,
                        contact.radius_mm / empty.model->mm_per_px,
                        depth_of_width_mm(2 * contact.radius_mm, images.set.ball_radius_mm)});
     } catch (const std::runtime_error&) {
-      continue;  // what shows no contact shows no depth either
+      continue;  // without contact no depth
     }
   }
   return taken;
@@ -55,7 +55,7 @@ Coverage cover(const PressImages& images, const calibration::Calibration& empty,
   }
   coverage.presses = contacts_of(images, empty);
   if (!coverage.made) return coverage;
-  // Depths as fitted; presses that were left out do not count.
+  // Uses fitted depths; presses that were left out do not count.
   std::erase_if(coverage.presses, [&](CapturedPress& press) {
     const auto used = std::ranges::find(coverage.report.presses, press.name,
                                         &calibration::PressReport::Depth::name);

@@ -12,7 +12,7 @@
 
 namespace dtact::ctl::guided {
 
-/// Shows frames: to the person who watches where there is one, and as preview.png in the work
+/// Shows frames: to a person who watches, if any, and as preview.png in the work
 /// folder.
 class LiveView {
  public:
@@ -22,19 +22,19 @@ class LiveView {
     scene_.presses_required = presses_required;
   }
 
-  /// The depth map's place and, once there is a reference, its image and cells (empty before).
+  /// The depth map's position and, once taken, the reference's image and cells (empty before).
   /// `cell_mm`: side of a look's cells.
   void use(const calibration::Calibration& empty, CellMeans reference, double cell_mm);
-  /// What is asked under the live picture, drawn at once, even while no frame comes.
+  /// The question under the live picture, drawn at once, even while no frame comes.
   void set_prompt(const Prompt& prompt);
-  /// What has been taken, and how deep its LUT reaches (0: there is none).
+  /// The presses so far, and the depth that their LUT covers (0: no LUT).
   void set_presses(std::vector<CapturedPress> presses, double covered_mm);
 
   /// Draws at most four times a second of the frames' time, and saves once a second; only where a
   /// person watches.
   void show(const ObservedFrame& look, const std::string& words);
-  /// Saves one frame, with the contact where it is known, and draws it to stay where something
-  /// touches.
+  /// Saves one frame, with the contact where it is known, and draws it to stay when it is in
+  /// contact.
   void still(const image::Grey8& frame, const std::optional<calibration::Contact>& contact,
              bool in_contact = true);
 

@@ -20,7 +20,7 @@ constexpr int kMargin = 12;
 constexpr int kFirstGrey = 232;
 constexpr int kGreys = 24;
 
-/// Mean of the picture's part that one of `columns` × `rows` equal places shows, as a grey.
+/// Mean of one of `columns` × `rows` equal parts of the picture, as a grey of the terminal.
 int grey_at(const image::Grey8& picture, int columns, int rows, int column, int row) {
   const int left = column * picture.width / columns;
   const int right = (column + 1) * picture.width / columns;
@@ -82,7 +82,7 @@ std::vector<std::string> half_blocks(const image::Grey8& picture, int columns) {
     for (int column = 0; column < columns; ++column) {
       const int above = grey_at(picture, columns, 2 * rows, column, 2 * row);
       const int below = grey_at(picture, columns, 2 * rows, column, 2 * row + 1);
-      // A colour holds until the next: most of a picture is one grey, and this travels over ssh.
+      // A colour stays until the next: most of a picture is one grey, and this travels over ssh.
       if (above != std::exchange(upper, above)) line += fmt::format("\x1b[38;5;{}m", above);
       if (below != std::exchange(lower, below)) line += fmt::format("\x1b[48;5;{}m", below);
       line += "\u2580";

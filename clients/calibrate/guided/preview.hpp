@@ -9,13 +9,13 @@
 
 namespace dtact::ctl::guided {
 
-/// How a frame differs from the undeformed surface, as a picture: light grey outside the contact,
+/// Difference of a frame from the undeformed surface, as a picture: light grey outside the contact,
 /// four shades darker for each grey level of darkening, lighter where the gel bulges. Both images
 /// are the depth map's part, of one size.
 [[nodiscard]] image::Grey8 darkening_picture(const image::Grey8& reference,
                                              const image::Grey8& frame);
 
-/// The picture with the contact's circle and width where there is one, and a scale bar.
+/// The picture with the contact's circle and width, if any, and a scale bar.
 [[nodiscard]] image::Rgb8 annotated(const image::Grey8& picture, double mm_per_px,
                                     const std::optional<calibration::Contact>& contact);
 

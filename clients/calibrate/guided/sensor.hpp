@@ -7,7 +7,7 @@
 
 namespace dtact::ctl::guided {
 
-/// What the session asks of a running daemon; the tests play one. Calls throw as client::Client.
+/// The session's view of a running daemon; the tests play one. Calls throw like client::Client.
 class Sensor {
  public:
   Sensor() = default;

@@ -21,11 +21,11 @@ constexpr double kWhiteShare = 0.01;
 constexpr std::uint8_t kWhite = 254;
 constexpr double kNoise = 2.5;
 
-using Conditions = google::protobuf::RepeatedField<int>;
+using HealthFlags = google::protobuf::RepeatedField<int>;
 
-bool has_any(const Conditions& health, std::initializer_list<v1::Health> wanted) {
+bool has_any(const HealthFlags& health, std::initializer_list<v1::Health> wanted) {
   return std::ranges::any_of(
-      health, [&](int condition) { return std::ranges::find(wanted, condition) != wanted.end(); });
+      health, [&](int flag) { return std::ranges::find(wanted, flag) != wanted.end(); });
 }
 
 }  // namespace
@@ -41,7 +41,7 @@ std::string unfit(const v1::Status& status) {
   return {};
 }
 
-bool passing_trouble(const Conditions& health) {
+bool passing_trouble(const HealthFlags& health) {
   return has_any(health, {v1::HEALTH_STARTING, v1::HEALTH_LIGHT_UNSETTLED,
                           v1::HEALTH_IMAGE_REPEATED, v1::HEALTH_CAMERA_FAULT});
 }
@@ -114,7 +114,7 @@ std::vector<std::string> differences(const calibration::Origin& then, const v1::
                                              .fps = origin.fps,
                                              .controls = origin.controls});
   const std::vector<std::string> light = calibration::light_mismatches(taken, origin.leds);
-  // Eight LEDs dimmed together are one thing to say.
+  // Eight LEDs dimmed together are one difference.
   found.insert(found.end(), light.begin(), light.begin() + (light.empty() ? 0 : 1));
   if (light.size() > 1) found.back() += fmt::format(" ({} more LEDs differ)", light.size() - 1);
   return found;

@@ -9,14 +9,14 @@
 
 namespace dtact::ctl::guided {
 
-/// What keeps a calibration from being made now, with the fix; empty when nothing does.
+/// The obstacle to a calibration now, with the fix; empty when there is none.
 [[nodiscard]] std::string unfit(const v1::Status& status);
 
-/// What is wrong with a picture of the undeformed surface, with the fix; empty: nothing. `table`:
-/// where the map lies in its frames.
+/// The fault of a picture of the undeformed surface, with the fix; empty: none. `table`:
+/// the map's position in its frames.
 [[nodiscard]] std::string fault_of(const SteadyFrames& still, const recon::RectifyTable& table);
 
-/// The frame cannot be used, though the next may: a light change under way, a repeated picture.
+/// Whether the frame cannot be used, though the next may: a light change or a repeated picture.
 [[nodiscard]] bool passing_trouble(const google::protobuf::RepeatedField<int>& health);
 
 /// Camera and light of the daemon, in the calibration's terms.

@@ -321,8 +321,8 @@ bool Session::make() {
   if (made_) return *made_;
   made_ = plan_.method == FitMethod::alone && coverage_.made != nullptr;
   if (plan_.method == FitMethod::alone || images_.set.presses.size() < 2) return *made_;
-  // What the presses lack by themselves, as a lighter one that is too faint to be seen, a gel may
-  // make up for; and a LUT may be doubted only with the gel.
+  // The gel may replace a missing press, for example a lighter one that is too faint to be seen;
+  // and a LUT may be doubtful only with the gel.
   std::string missing;
   try {
     calibration::PressReport report;

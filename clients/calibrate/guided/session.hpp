@@ -13,7 +13,7 @@
 
 namespace dtact::ctl::guided {
 
-/// What the command line asks for.
+/// The settings from the command line.
 struct Plan {
   std::filesystem::path folder;  ///< The work folder.
   double ball_radius_mm = 0;
@@ -21,20 +21,20 @@ struct Plan {
   int presses = 6;  ///< Presses after which the calibration is made, if they suffice.
   int reference_frames = 32;
   int press_frames = 16;
-  double timeout_s = 60;  ///< For each take.
-  bool force = false;     ///< A doubtful LUT is taken, too.
+  double timeout_s = 60;  ///< Limit of each capture.
+  bool force = false;     ///< Accepts a doubtful LUT, too.
   FitMethod method = FitMethod::automatic;
-  std::string again;  ///< The command line that goes on with the work folder, for a shell.
+  std::string again;  ///< The command line that continues the work folder, for a shell.
 };
 
 enum class Outcome {
   uploaded,    ///< The daemon uses the calibration.
-  kept,        ///< It was made and, as the user wished, not uploaded.
-  unfinished,  ///< The user or the input ended the session before there was one.
+  kept,        ///< It was made and, on request, not uploaded.
+  unfinished,  ///< The user or the input ended the session before.
 };
 
 /// The guided calibration: reference, presses, LUT, upload. Each is saved in the work folder as
-/// soon as it is taken, so another session can continue at any point.
+/// soon as it is captured, so another session can continue at any point.
 class Session {
  public:
   /// Throws std::runtime_error when the work folder cannot be made.
@@ -42,7 +42,7 @@ class Session {
 
   /// Throws std::runtime_error with a fix when the daemon is not ready, a capture fails without a
   /// user to fix it, or camera or light changed since the work folder was begun;
-  /// client::Error as the sensor does.
+  /// client::Error like the sensor.
   [[nodiscard]] Outcome run();
 
  private:
@@ -50,7 +50,7 @@ class Session {
   void greet();
   void prepare_map(const v1::Status& status);
   void resume();
-  /// The daemon's state, after a while where it is unfit: a camera that stumbles comes back by
+  /// The daemon's state, after a wait where it is unfit: a camera with a passing fault recovers by
   /// itself.
   [[nodiscard]] v1::Status steady_status();
   /// Throws unless camera and light are those of the reference.
@@ -59,13 +59,13 @@ class Session {
   [[nodiscard]] std::string ask(const Prompt& prompt);
 
   void reference_step();
-  /// Until there is a LUT and the user, or the number of presses, says that it is enough.
+  /// Captures presses until there is a LUT and the user, or the number of presses, ends it.
   void press_steps();
   [[nodiscard]] Prompt press_prompt() const;
   void take_press(const std::string& name);
   void judge();
-  /// Makes the calibration by the method that was asked for, once for the presses that there are;
-  /// whether there is one. If not, coverage_.missing says why.
+  /// Makes the calibration with the chosen method, once for the present presses; returns
+  /// whether it succeeded. If not, coverage_.missing has the reason.
   [[nodiscard]] bool make();
   [[nodiscard]] Outcome finish();
   void upload();
@@ -81,9 +81,9 @@ class Session {
   PressImages images_;
   calibration::Calibration empty_;  ///< The map and the reference, without a LUT.
   CellMeans reference_;
-  CellMeans last_;  ///< The press taken last.
+  CellMeans last_;  ///< The last press.
   Coverage coverage_;
-  std::optional<bool> made_;  ///< What make() came to.
+  std::optional<bool> made_;  ///< Result of make().
 };
 
 }  // namespace dtact::ctl::guided

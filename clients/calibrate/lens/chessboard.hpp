@@ -15,7 +15,7 @@ struct Chessboard {
   double square_mm = 0;
 };
 
-/// A lens from chessboards. The first image's board lies on the surface and fixes scale and place;
+/// A lens from chessboards. The first image's board is on the surface and fixes scale and position;
 /// the millimetres' origin is the middle of its corners.
 struct ChessboardLens {
   ChosenLens lens;          ///< Through the first image's corners, or through all images'.
@@ -25,9 +25,8 @@ struct ChessboardLens {
 /// One image: the lens through its corners, as through the pins of a board (choose_lens). Four and
 /// more: OpenCV's camera calibration over all with square pixels and one to three radial terms, the
 /// number chosen by leaving out one image at a time; its residuals are then those of the first
-/// image's corners, left out with its image. Images are 8-bit grey; `names` stand in errors. Throws
-/// std::runtime_error naming the image in which no board was found, and when there are two or
-/// three.
+/// image's corners, left out with its image. Images are 8-bit grey; `names` appear in errors.
+/// Throws std::runtime_error naming the image without a board, and for two or three images.
 [[nodiscard]] ChessboardLens calibrate_chessboards(const std::vector<cv::Mat1b>& images,
                                                    const std::vector<std::string>& names,
                                                    const Chessboard& board);

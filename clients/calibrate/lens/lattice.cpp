@@ -26,7 +26,7 @@ struct Steps {
 /// Follows the lattice from one candidate with a first guess of its steps.
 Net grow(const std::vector<Candidate>& candidates, std::size_t seed, const Steps& first) {
   // A prediction may err by this part of the step: neighbouring steps differ by a few per cent, and
-  // half a step would reach what lies between two nodes.
+  // half a step would reach points between two nodes.
   constexpr double kTolerance = 0.3;
   Net net{{{0, 0}, seed}};
   std::set<std::size_t> used{seed};
@@ -71,7 +71,7 @@ Net largest_net(const std::vector<Candidate>& candidates, std::size_t enough) {
                               [](cv::Point2d p) { return cv::norm(p); });
     near.resize(count);
     for (const cv::Point2d along : near) {
-      // Rows are what lies closer to level in the image.
+      // Rows are the direction closer to level in the image.
       if (along.x <= 0 || along.x < std::abs(along.y)) continue;
       for (const cv::Point2d down : near) {
         const double across = cross(along, down);

@@ -10,7 +10,7 @@ namespace {
 using recon::Lens;
 using recon::Point;
 
-/// Places about a pin to two and a half sigma, about a pixel apart.
+/// Points about a pin to two and a half sigma, about a pixel apart.
 std::vector<Point> sample(double sigma, double mm_per_px) {
   const double reach = 2.5 * sigma;
   const int half = std::clamp(static_cast<int>(std::ceil(reach / mm_per_px)), 8, 40);
@@ -60,9 +60,9 @@ std::optional<PinFit::Peak> PinFit::find(const Lens& lens, Point start, double r
     const Eigen::Matrix2d bend{{2 * c[3], c[4]}, {c[4], 2 * c[5]}};
     const bool peak = c[3] + c[5] < 0 && bend.determinant() > 0;
     // Uphill by half of Newton's step where the surface is a peak (the cubic terms change with
-    // the place, so that the slope falls about twice as fast as the bend says and the whole step
-    // swings about the peak), else along the slope; at most half a sigma, as far as the fit is to
-    // be trusted.
+    // the position, so the slope falls about twice as fast as the bend predicts and the whole step
+    // oscillates about the peak), else along the slope; at most half a sigma, the range where the
+    // fit is trusted.
     const Eigen::Vector2d slope(c[1], c[2]);
     Eigen::Vector2d move = peak ? Eigen::Vector2d(-0.5 * bend.inverse() * slope) : 1e9 * slope;
     const double size = move.norm();
@@ -89,7 +89,7 @@ std::optional<Eigen::VectorXd> PinFit::fit_at(const Lens& lens, Point at) const 
   return solver_ * values;
 }
 
-/// Beyond the frame its edge goes on, so that a pin at the edge is not cut off.
+/// Beyond the frame its edge is repeated, so that a pin at the edge is not cut off.
 double PinFit::bilinear(Point px) const {
   const double x = std::clamp<double>(px.x, 0, image_.cols - 1);
   const double y = std::clamp<double>(px.y, 0, image_.rows - 1);

@@ -10,13 +10,13 @@
 namespace dtact::ctl {
 
 /// A pin's neighbourhood in the plane of the surface, and the fit to it: a third-order surface with
-/// Gaussian weights of a fifth of the pitch (pins.hpp says why).
+/// Gaussian weights of a fifth of the pitch (see pins.hpp).
 class PinFit {
  public:
   /// `image`: darkening, outlives this.
   PinFit(const cv::Mat1f& image, double pitch_mm, double mm_per_px);
 
-  /// What the noise of one pixel makes of the height below.
+  /// Noise of the height below for the noise of one pixel.
   [[nodiscard]] double height_noise(double pixel_noise) const;
 
   struct Peak {

@@ -14,14 +14,14 @@ namespace {
 
 constexpr double kUnit = 10;  // mm, so that x² is of the order of one
 
-/// A pin: its darkening and where it is, in units.
+/// A pin: its darkening and position, in units.
 struct Pin {
   double x = 0;
   double y = 0;
   double levels = 0;
 };
 
-/// levels · (1 + q·(x², xy, y²)) = plane: all pins are of one length, the board may be aslant.
+/// levels · (1 + q·(x², xy, y²)) = plane: all pins are equally long, the board may be tilted.
 struct Surface {
   std::array<double, 3> plane = {};
   std::array<double, 3> q = {};
@@ -59,7 +59,7 @@ Surface fit(const std::vector<Pin>& pins, bool quadratic, std::size_t out) {
 
 struct LeftOutPins {
   std::vector<double> squares;
-  std::vector<double> gain;  ///< At each pin, of the surface through the others.
+  std::vector<double> gain;  ///< At each pin, from the surface through the others.
 };
 
 LeftOutPins leave_pins_out(const std::vector<Pin>& pins, bool quadratic) {
@@ -79,7 +79,7 @@ double root_mean(const std::vector<double>& squares) {
   return std::sqrt(sum / static_cast<double>(squares.size()));
 }
 
-/// An image, smoothed, at the marks.
+/// Values of a smoothed image at the marks.
 std::vector<float> read(const cv::Mat1f& image, std::span<const Mark> marks, double sigma) {
   cv::Mat1f smooth;
   cv::GaussianBlur(image, smooth, {}, sigma, sigma, cv::BORDER_REPLICATE);

@@ -10,27 +10,27 @@
 
 namespace dtact::ctl {
 
-/// Flat-field gain from the pins of a board, all of one length: how the darkening of the same dent
-/// varies over the map.
+/// Flat-field gain from the pins of a board, all equally long: variation of the darkening of the
+/// same dent over the map.
 struct PinGain {
   recon::FlatFieldGain gain;  ///< Places in millimetres of the marks.
-  /// RMS of the relative error with which the others predict each pin's darkening, with no gain,
+  /// RMS of the relative error with which the others predict each pin's darkening: with no gain,
   /// with the share of the light, with a quadratic.
   std::vector<double> left_out_of_each;
   /// For each mark, the gain that the others chose at its place over the one above.
   std::vector<double> left_out_ratio;
 
-  /// In a sentence.
+  /// A description of one sentence.
   [[nodiscard]] std::string describe() const;
 };
 
 /// Chooses the gain: none; the share of the light (a lens that darkens towards its corners, an
-/// uneven ring); a quadratic of the place (a gel thicker in the middle). A later one is taken
-/// only when the pins that are left out are clearly better predicted (clearly_lower()). A plane is
-/// no choice: it is always taken off, since a board pressed in aslant looks the same.
+/// uneven ring); a quadratic of the position (a gel thicker in the middle). A later one is used
+/// only when the left-out pins are clearly better predicted (clearly_lower()). A plane is
+/// no choice: it is always removed, since a tilted board looks the same.
 ///
-/// `reference`, `frame`: grey levels; `marks`: as find_pins() gives them, at least twelve;
-/// `smoothing_px`: standard deviation of the Gaussian that the darkening is read with.
+/// `reference`, `frame`: grey levels; `marks`: from find_pins(), at least twelve;
+/// `smoothing_px`: standard deviation of the Gaussian with which the darkening is read.
 [[nodiscard]] PinGain choose_gain(const cv::Mat1f& reference, const cv::Mat1f& frame,
                                   std::span<const Mark> marks, double smoothing_px);
 

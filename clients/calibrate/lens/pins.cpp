@@ -21,7 +21,7 @@ using recon::Lens;
 using recon::Point;
 
 /// Standard deviation of the pixel noise: from the median absolute response of the 3×3 filter that
-/// is blind to planes and edges (Immerkær 1996), which the pins hardly move.
+/// is blind to planes and edges (Immerkær 1996); the pins hardly affect it.
 double noise_of(const cv::Mat1f& image) {
   const cv::Matx33f filter(1, -2, 1, -2, 4, -2, 1, -2, 1);  // norm 6
   cv::Mat1f response;
@@ -36,7 +36,7 @@ double noise_of(const cv::Mat1f& image) {
 /// Darkening in grey levels of the mean light, as if the light were even.
 cv::Mat1f relative_darkening(const cv::Mat1f& reference, const cv::Mat1f& frame) {
   constexpr double kSmooth = 3;      // pixels: the light is smooth, the camera's noise is not
-  constexpr double kDarkest = 0.05;  // of the mean; below it there is nothing to see
+  constexpr double kDarkest = 0.05;  // of the mean; darker parts are ignored
   cv::Mat1f light;
   cv::GaussianBlur(reference, light, {}, kSmooth, kSmooth, cv::BORDER_REPLICATE);
   const double mean = cv::mean(light)[0];
@@ -55,12 +55,12 @@ Point place_mm(const Board& board, const Lattice& lattice, int row, int col) {
       missing.size(), pins, fmt::join(missing, "; ")));
 }
 
-/// What the pins are first looked for with: not led astray by a few bad places.
+/// The model of the first search: robust against a few bad points.
 LensModel searching_model(std::size_t marks) {
   return marks >= 24 ? LensModel::radial1 : LensModel::affine;
 }
 
-/// A lattice followed up in the image: the pins found and those that are not.
+/// A lattice refined in the image: the pins found and those missing.
 struct Settled {
   const Lattice* lattice = nullptr;
   std::vector<Mark> marks;
@@ -86,8 +86,8 @@ double neighbours_height(const std::vector<double>& heights, const Lattice& latt
 
 std::string name_of(int row, int col) { return fmt::format("row {}, column {}", row + 1, col + 1); }
 
-/// What lies far off the lens through all of them is no pin but something else in its place, such
-/// as the rim of a leak. Returns whether there was any.
+/// Drops points far off the lens through all pins: they are something else,
+/// such as the rim of a leak. Returns whether it dropped any.
 bool drop_strays(Settled& settled, const Lens& lens, const Board& board) {
   constexpr double kFar = 6;  // medians of the distances; seven standard deviations if normal
   std::vector<double> distances;
@@ -163,7 +163,7 @@ Settled settle(const cv::Mat1f& image, double noise, const Lattice& lattice, con
   return settled;
 }
 
-/// Whether two lattices are of the same places, found at other scales.
+/// Whether two lattices have the same points, found at other scales.
 bool same_places(const Lattice& a, const Lattice& b, double apart) {
   if (a.rows != b.rows) return false;
   for (std::size_t i = 0; i < a.places.size(); ++i) {
@@ -174,7 +174,7 @@ bool same_places(const Lattice& a, const Lattice& b, double apart) {
   return true;
 }
 
-/// All lattices at several scales, of the board as it is and on edge.
+/// All lattices at several scales, with the board upright and on edge.
 std::vector<Lattice> lattices_of(const cv::Mat1f& image, const Board& board) {
   // Shares of the image's shorter side: from pins a few pixels wide to a board twice as large as
   // the frame.
@@ -189,7 +189,7 @@ std::vector<Lattice> lattices_of(const cv::Mat1f& image, const Board& board) {
       if (board.rows == board.cols) break;
     }
   }
-  // The fullest first; of those of the same places one is enough.
+  // The fullest first; of those with the same points one is enough.
   std::ranges::stable_sort(all, std::greater<>{}, &Lattice::found);
   const double apart = 0.25 * std::min(image.rows, image.cols) / std::max(board.rows, board.cols);
   std::vector<Lattice> distinct;
@@ -206,7 +206,7 @@ std::vector<Lattice> lattices_of(const cv::Mat1f& image, const Board& board) {
 
 PinPress find_pins(const cv::Mat1f& reference, const cv::Mat1f& frame, const Board& board) {
   constexpr std::size_t kTries = 30;
-  constexpr int kMayMiss = 10;  // one in so many: a lattice that is a row off misses more
+  constexpr int kMayMiss = 10;  // one in ten: a lattice that is a row off misses more
   const cv::Mat1f image = relative_darkening(reference, frame);
   std::vector<Lattice> lattices = lattices_of(image, board);
   lattices.resize(std::min(lattices.size(), kTries));
@@ -214,7 +214,7 @@ PinPress find_pins(const cv::Mat1f& reference, const cv::Mat1f& frame, const Boa
   Settled best;
   for (const Lattice& lattice : lattices) {
     Settled settled = settle(image, noise, lattice, board);
-    // The most pins, and of those windows and scales that have them the most regular one.
+    // The most pins; among windows and scales with equally many the most regular one.
     const bool better =
         best.lattice == nullptr || settled.missing.size() < best.missing.size() ||
         (settled.missing.size() == best.missing.size() && settled.rms_mm < best.rms_mm);

@@ -21,7 +21,7 @@ constexpr LensModel kModels[] = {LensModel::affine,  LensModel::projective, Lens
                                  LensModel::radial2, LensModel::radial3,    LensModel::radial4};
 constexpr std::size_t kHomography = 8;
 
-/// The solver came to no parameters that could be used.
+/// The solver found no usable parameters.
 class FitFailed : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
@@ -79,8 +79,8 @@ Lens lens_of(const Parameters& p, const Units& u) {
   return lens;
 }
 
-/// Distances of all marks in the picture, in `units`. What is free comes first of the parameters;
-/// the others stay as they are.
+/// Distances of all marks in the picture, in `units`. Free parameters come first;
+/// the others keep their values.
 class MarkCost {
  public:
   MarkCost(std::span<const Mark> marks, const Units& units, const Parameters& start,
@@ -93,7 +93,7 @@ class MarkCost {
     const Lens lens = lens_of(p, units_);
     for (const Mark& mark : marks_) {
       const Point at = project(lens, mark.mm);
-      // Where the lens folds it shows no such mark: as wrong as the marks are wide, far more than
+      // Where the lens folds it shows no mark: the penalty is the marks' extent, far more than
       // any step gains elsewhere.
       const bool shown = std::isfinite(at.x) && std::isfinite(at.y);
       *errors++ = shown ? (at.x - mark.px.x) / units_.px_size : 1;
@@ -122,7 +122,7 @@ Parameters affine_start(std::span<const Mark> marks, const Units& u, std::size_t
     b(i, 1) = (mark.px.y - u.px.y) / u.px_size;
     ++i;
   }
-  // Places on a line leave one direction of the plane open. The places are in units of their own
+  // Marks on a line leave one direction of the plane open. They are in units of their own
   // extent, so that noise alone stays far below a thousandth.
   constexpr double kLine = 1e-3;
   const Eigen::BDCSVD<Eigen::MatrixXd> svd(a, Eigen::ComputeThinU | Eigen::ComputeThinV);
@@ -138,8 +138,8 @@ Parameters affine_start(std::span<const Mark> marks, const Units& u, std::size_t
   return p;
 }
 
-/// Fits the model's parameters, the first ones of `p`. Throws FitFailed where the solver fails, so
-/// that a smaller model's parameters do not pass as this one's.
+/// Fits the model's parameters, the first ones of `p`. Throws FitFailed when the solver fails, so
+/// that a smaller model's parameters are not returned as this one's.
 void minimise(Parameters& p, const Units& u, std::span<const Mark> marks, LensModel model) {
   const int n = parameters(model);
   auto cost = std::make_unique<ceres::DynamicNumericDiffCostFunction<MarkCost, ceres::CENTRAL>>(
@@ -167,7 +167,7 @@ Parameters fit(std::span<const Mark> marks, const Units& u, LensModel model) {
     throw std::runtime_error("lens: too few points");
   }
   Parameters p = affine_start(marks, u, radial_terms(model));
-  // The larger model starts from the smaller one's end: a lens's terms trade against each other.
+  // The larger model starts at the smaller one's result: a lens's terms are correlated.
   for (const LensModel stage : kModels) {
     if (stage > model) break;
     if (stage != LensModel::affine) minimise(p, u, marks, stage);
@@ -243,7 +243,7 @@ ChosenLens choose_lens(std::span<const Mark> marks) {
   ChosenLens best;
   std::vector<double> best_squares;
   for (const LensModel model : kModels) {
-    // Twice as many coordinates as parameters at least, also with one mark left out.
+    // Needs at least twice as many coordinates as parameters, also with one mark left out.
     if (marks.size() < static_cast<std::size_t>(parameters(model)) + 1) break;
     std::vector<Point> left_out;
     try {

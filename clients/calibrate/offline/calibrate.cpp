@@ -24,13 +24,13 @@ struct DepthOptions {
   bool force = false;
 };
 
-/// A calibration and what speaks against it.
+/// A calibration and the doubts about it.
 struct Made {
   calibration::Calibration calibration;
   std::vector<std::string> doubts;
 };
 
-/// By the paper's LUT of one press.
+/// With the paper's LUT of one press.
 Made make_published(const DepthOptions& options) {
   const ImageSet reference = load_images(options.reference, "--reference");
   const ImageSet ball = load_images(options.ball, "--ball");
@@ -53,7 +53,7 @@ Made make_published(const DepthOptions& options) {
   return {std::move(made), std::move(doubts)};
 }
 
-/// From one press or several.
+/// With the LUT of one press or several.
 Made make_lut(const DepthOptions& options) {
   PressImages images = begin_presses(options.reference, options.radius_mm, options.map);
   if (!options.ball.empty()) add_press(images, options.ball, "--ball");
@@ -133,7 +133,7 @@ void add_calibrate(CLI::App& app) {
           "--method", options->method,
           "auto (default): a gel is fitted to the whole image of the presses; where it explains "
           "all but noise, its LUT, else what the presses show, at the gel's depths where all "
-          "parts of the picture agree on them; model: the gel's LUT anyhow; LUT: from the "
+          "parts of the picture agree on them; model: the gel's LUT in any case; list: from the "
           "known sphere alone; to compare with: published (one press), regression (several)")
       ->check(CLI::IsMember({"auto", "list", "model", "published", "regression"}));
   depth

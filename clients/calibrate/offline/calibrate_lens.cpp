@@ -28,7 +28,7 @@ struct LensOptions {
   std::string output;
 };
 
-/// "7x9".
+/// Parses "7x9".
 std::pair<int, int> pair_of(const std::string& text, const char* option) {
   int first = 0;
   int second = 0;

@@ -39,7 +39,7 @@ calibration::LensFile lens_for(const std::string& path, int width, int height) {
   return file;
 }
 
-/// "FOLDER@0.8": the images and the depth that was measured.
+/// Splits "FOLDER@0.8" into the images and the measured depth.
 std::pair<std::string, std::optional<double>> split_press(const std::string& text) {
   const std::size_t at = text.rfind('@');
   if (at == std::string::npos) return {text, std::nullopt};

@@ -11,12 +11,12 @@
 
 namespace dtact::ctl {
 
-/// Where the depth map lies in the frame and how large its pixels are, as the command line says it.
+/// Position of the depth map in the frame and size of its pixels, from the command line.
 struct MapOptions {
-  double mm_per_px = 0;     ///< 0: the lens's in the middle.
-  std::string lens;         ///< A lens file or a calibration folder; empty: the frame as it is.
+  double mm_per_px = 0;  ///< 0: the lens's in the middle.
+  std::string lens;  ///< A lens file or a calibration folder; empty: the frame is not rectified.
   std::vector<int> centre;  ///< x, y in pixels; empty: the frame's.
-  std::vector<int> crop;    ///< Width, height in pixels; empty: all that the frame shows.
+  std::vector<int> crop;    ///< Width, height in pixels; empty: the whole frame.
 };
 
 /// Adds --mm-per-px, --lens, --centre and --crop.
@@ -32,18 +32,18 @@ struct MapChoice {
 };
 
 /// Throws std::runtime_error naming the option when neither scale nor lens is given, the lens
-/// belongs to another frame size or the centre stands alone.
+/// is for another frame size or the centre is given alone.
 [[nodiscard]] MapChoice choose_map(const MapOptions& options, int frame_width, int frame_height);
 
-/// Several presses of one ball, and what is recorded of where they come from.
+/// Several presses of one ball, and the record of their origin.
 struct PressImages {
   calibration::BallPresses set;
   recon::FlatFieldGain gain;  ///< From the lens file.
   calibration::Origin origin;
 };
 
-/// The reference images and no press yet. Camera and light are recorded from the sensor.toml of a
-/// folder in `reference` that has one. Throws as load_images() and choose_map().
+/// Loads the reference images, without presses. Camera and light come from the sensor.toml of a
+/// folder in `reference` that has one. Throws like load_images() and choose_map().
 [[nodiscard]] PressImages begin_presses(const std::vector<std::string>& reference,
                                         double ball_radius_mm, const MapOptions& map);
 
@@ -51,35 +51,35 @@ struct PressImages {
 /// Throws std::runtime_error naming --press, also where the set has these images already.
 void add_press(PressImages& images, const std::string& press);
 
-/// What the darkening of a ball's presses is turned into a LUT by.
+/// The method that turns the darkening of a ball's presses into a LUT.
 enum class FitMethod : std::uint8_t {
-  automatic,  ///< What is best for what the presses show: calibration::build_auto().
+  automatic,  ///< The best for the presses: calibration::build_auto().
   alone,      ///< The known sphere alone: calibration::build_from_sphere().
   model       ///< A gel fitted to the presses: calibration::build_model().
 };
 /// By its name on the command line: "auto", "list" or "model".
 [[nodiscard]] FitMethod fit_method(const std::string& name);
 
-/// Adds one press: PNG files or folders. Throws as load_images(), and std::runtime_error naming the
-/// option when they have not the reference's size.
+/// Adds one press: PNG files or folders. Throws like load_images(), and std::runtime_error naming
+/// the option when their size differs from the reference's.
 void add_press(PressImages& images, const std::vector<std::string>& paths, const char* option);
 
-/// The calibration of one press or several, its origin filled in. Throws as
+/// The calibration of one press or several, with its origin. Throws like
 /// calibration::build_auto() and build_model().
 [[nodiscard]] calibration::Calibration build_lut(const PressImages& images, FitMethod method,
                                                  calibration::PressReport* report);
 
-/// Camera and light of the images in these folders, where a sensor.toml says so.
+/// Camera and light of the images in these folders, from a sensor.toml.
 [[nodiscard]] calibration::Origin recorded_origin(const std::vector<std::string>& paths);
 
-/// Now, as calibrations write it.
+/// The present time in the format of calibrations.
 [[nodiscard]] std::string utc_now();
 
-/// Each press's depth, those left out, and what decided about the gain; lines.
+/// Each press's depth, those left out, and the reason for the gain; lines.
 [[nodiscard]] std::string report_text(const calibration::PressReport& report);
-/// What the LUT covers and what it is uncertain by; lines.
+/// The LUT's covered range and uncertainty; lines.
 [[nodiscard]] std::string lut_text(const recon::Model& model);
-/// The gel in words; lines.
+/// A description of the gel; lines.
 [[nodiscard]] std::string gel_text(const calibration::GelEstimate& gel);
 
 }  // namespace dtact::ctl

@@ -62,7 +62,7 @@ int text_width(const std::string& text) {
 
 void draw_text(Picture& picture, cv::Point corner, const std::string& text,
                const cv::Scalar& colour) {
-  // OpenCV wants the left end of the line that letters stand on.
+  // OpenCV wants the left end of the baseline.
   cv::putText(picture, text, corner + cv::Point(0, kTextHeight - 2), kFont, kScale, colour, 1,
               cv::LINE_AA);
 }

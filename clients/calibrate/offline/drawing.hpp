@@ -15,7 +15,7 @@ using Picture = cv::Mat3b;
 inline constexpr int kTextHeight = 14;
 /// Width of a text, pixels.
 [[nodiscard]] int text_width(const std::string& text);
-/// Writes a line of text with its upper left corner there.
+/// Writes a line of text with its upper left corner at `corner`.
 void draw_text(Picture& picture, cv::Point corner, const std::string& text,
                const cv::Scalar& colour);
 

@@ -17,25 +17,25 @@ struct ImageSet {
 
   [[nodiscard]] int width() const { return images.front().width; }
   [[nodiscard]] int height() const { return images.front().height; }
-  /// The frames as 8-bit luma, as the daemon gets them.
+  /// The frames as 8-bit luma, the daemon's format.
   [[nodiscard]] std::vector<image::Grey8> frames() const;
   /// The mean as Q8 luma (grey level times 256).
   [[nodiscard]] image::Grey16 mean_q8() const;
 };
 
-/// Reads PNG files; a folder stands for the PNG files in it, by name. `option` names the command
+/// Reads PNG files; a folder means the PNG files in it, by name. `option` names the command
 /// line's option in errors. Throws std::runtime_error naming the file.
 [[nodiscard]] ImageSet load_images(const std::vector<std::string>& paths,
                                    const std::string& option);
 
-/// Throws std::runtime_error when two sets are not of one size.
+/// Throws std::runtime_error when two sets differ in size.
 void require_same_size(const ImageSet& a, const std::string& a_option, const ImageSet& b,
                        const std::string& b_option);
 
 /// The mean of a set, grey levels.
 [[nodiscard]] cv::Mat1f mean_levels(const ImageSet& set);
 
-/// Each image of a set as OpenCV's.
+/// The images of a set as OpenCV's.
 [[nodiscard]] std::vector<cv::Mat1b> grey_images(const ImageSet& set);
 
 }  // namespace dtact::ctl

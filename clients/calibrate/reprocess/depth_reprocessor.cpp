@@ -141,7 +141,7 @@ void DepthReprocessor::describe(const recon::DepthSums& sums, const pipeline::Re
     contact.set_force_uncertainty_n(summary_.force->uncertainty_n);
   }
   frame.clear_contact_absence();
-  frame.clear_calibration();  // of the daemon's numbers it has none
+  frame.clear_calibration();  // the daemon has no number for it
   frame.clear_times();
   set(frame, v1::HEALTH_UNCALIBRATED, false);
   set(frame, v1::HEALTH_BEYOND_CALIBRATION, beyond);

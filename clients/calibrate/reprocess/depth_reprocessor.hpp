@@ -29,13 +29,13 @@ class DepthReprocessor {
   /// Throws std::invalid_argument when the calibration covers too little of the frame.
   explicit DepthReprocessor(std::shared_ptr<const calibration::Calibration> calibration);
 
-  /// The reference image from here on, Q8 luma of the frame's size; its light was followed by a
-  /// factor already.
+  /// Sets the reference image from here on, Q8 luma of the frame's size; a factor has already
+  /// followed its light.
   void set_reference(std::span<const std::uint16_t> reference_q8, double light = 1);
 
-  /// Replaces `frame`'s depth, contact and what follows from them. The map has the resolution that
-  /// the frame's own had and is sharpened by as many steps; full resolution and none where it had
-  /// no map, and no steps where the calibration has no LUT for them.
+  /// Replaces `frame`'s depth, contact and values computed from them. The map has the resolution
+  /// and the sharpening steps of the frame's own; full resolution and no steps without an own map,
+  /// and no steps where the calibration has no LUT for them.
   void remake(const hal::LumaView& luma, v1::Frame& frame);
 
   /// Frames so far whose own map was sharpened by steps that the calibration has no LUT for.
@@ -53,7 +53,7 @@ class DepthReprocessor {
 
   void follow_light(const pipeline::LightSeen& light, std::int64_t timestamp_ns);
   void set_light(double factor);
-  /// What makes such maps, for the reference and the light of now.
+  /// The maps of this kind, for the present reference and light.
   [[nodiscard]] pipeline::Resolutions& maps_for(const MapVariant& variant);
   void describe(const recon::DepthSums& sums, const pipeline::Resolutions& maps,
                 pipeline::Resolution& resolution, v1::Frame& frame);
@@ -66,8 +66,8 @@ class DepthReprocessor {
   pipeline::LightFollower follower_;
   pipeline::ContactDetector contact_;
   pipeline::ContactSummary summary_;
-  double light_ = 1;      // followed before the recording
-  double light_now_ = 1;  // and since
+  double light_ = 1;      // factor of the light before the recording
+  double light_now_ = 1;  // and since then
   std::vector<std::int16_t> depth_um_;
   recon::DrawnTiles drawn_;
   MapVariant drawn_variant_;

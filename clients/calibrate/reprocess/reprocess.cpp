@@ -40,8 +40,8 @@ std::span<const std::uint8_t> payload_of(const v1::Frame& frame) {
   return {reinterpret_cast<const std::uint8_t*>(data.data()), data.size()};
 }
 
-/// The daemon would have measured depth in it, given a calibration. While the light is another than
-/// the reference's the daemon makes do with a scaled one, which no recording holds.
+/// Whether the daemon would have measured depth in it with a calibration. While the light differs
+/// from the reference's the daemon uses a scaled one, which no recording holds.
 bool measurable(const v1::Frame& frame) {
   return !has(frame, v1::HEALTH_STARTING) && !has(frame, v1::HEALTH_LIGHT_UNSETTLED) &&
          !has(frame, v1::HEALTH_REFERENCE_STALE);
@@ -72,7 +72,7 @@ class Reprocessor {
       return true;
     };
     handlers.event = [this](const v1::Event& event, std::uint64_t) {
-      // Contact is judged anew.
+      // Contact is determined again.
       if (!event.has_contact()) writer_.add(event);
       return true;
     };
@@ -86,7 +86,7 @@ class Reprocessor {
     writer_.finish();
   }
 
-  /// DepthReprocessor::unsharpened().
+  /// See DepthReprocessor::unsharpened().
   [[nodiscard]] std::uint64_t unsharpened() const noexcept { return remaker_.unsharpened(); }
 
   [[nodiscard]] cli::RecordingReport report() const {
@@ -112,7 +112,7 @@ class Reprocessor {
     return status == hal::mjpeg::Status::ok;
   }
 
-  /// The mean of the first frames, without contact according to the user.
+  /// Takes the mean of the first frames, without contact according to the user.
   void take_first_frames() {
     if (options_.reference_frames == 0) {
       throw std::runtime_error(
@@ -149,7 +149,7 @@ class Reprocessor {
     return static_cast<std::size_t>(frame_width()) * static_cast<std::size_t>(frame_height());
   }
 
-  /// The reference of this time, where it is another than before.
+  /// Uses the reference of this time, where it changed.
   void follow_reference(std::uint64_t time) {
     const auto place = recording::find_attachment(file_, recording::kCurrentReferencePng, time);
     if (!place || place->offset == reference_at_) return;

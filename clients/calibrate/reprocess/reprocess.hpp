@@ -4,7 +4,7 @@
 
 namespace dtact::reprocess {
 
-/// reprocess RECORDING --calibration NEW -o OUT.mcap: makes the depth of a recording anew.
+/// reprocess RECORDING --calibration NEW -o OUT.mcap: recomputes the depth of a recording.
 void add_reprocess(CLI::App& app, cli::Context& context);
 
 }  // namespace dtact::reprocess

@@ -38,7 +38,7 @@ std::string positional(const Argument& argument) {
   return argument.required ? name : "[" + name + "]";
 }
 
-/// How a command is called: what has to be said, and where there is more to say.
+/// How a command is called, with a placeholder where details are elsewhere.
 std::string usage(const std::string& path, const Command& command) {
   std::string text = bold(path);
   const bool optional =
@@ -98,7 +98,7 @@ void append_footer(const std::string& footer, std::string& page) {
   }
 }
 
-/// The description's first sentence as a page's NAME has it: "talks to dtactd".
+/// The description's first sentence in the form of a page's NAME: "talks to dtactd".
 std::string purpose(const std::string& description) {
   const auto end = description.find(".\n");
   std::string text = description.substr(0, end);
@@ -118,8 +118,8 @@ std::string program_page(const Command& program, const PageNotes& notes) {
   page += heading("OPTIONS");
   if (!program.commands.empty()) {
     page +=
-        filled(escaped("They may stand before and behind a command; behind it `--help` tells "
-                       "of that command alone."));
+        filled(escaped("They may come before or after a command; after it `--help` describes "
+                       "only that command."));
   }
   page += list(program.options);
   if (!program.commands.empty()) {

@@ -38,7 +38,7 @@ double mean_of_sure(const SymmetricPress& press, const Value& value) {
   return sum / pixels;
 }
 
-/// Multiples of the ball's radius; the profile reaches 2.25 (kFarField).
+/// In multiples of the ball's radius; the profile reaches 2.25 (kFarField).
 constexpr std::array<double, 2> kReaches = {1.5, 1.75};
 /// Right, down, left, up.
 constexpr std::array<std::pair<int, int>, 4> kSides = {{{1, 0}, {0, 1}, {-1, 0}, {0, -1}}};
@@ -60,7 +60,7 @@ std::vector<PixelFilter> parts_of(const SymmetricPress& press) {
   return parts;
 }
 
-/// What depth_spread_mm() may be for a gel's depth to be taken from it, millimetres: simulated
+/// Limit of depth_spread_mm() for using the gel's depth, millimetres: simulated
 /// sensors have 0.024 at most, one of another law 0.010; the two real presses 0.07 and 0.24.
 constexpr double kMaxSpread = 0.03;
 
@@ -76,7 +76,7 @@ BallPress only_press(const BallPresses& set, const recon::FlatFieldGain& gain) {
           .depth_mm = set.presses.front().depth_mm};
 }
 
-/// A press as a calibration sees it, without the gain that is the press's own.
+/// A press seen with the calibration, without the gain that is the press's own.
 SymmetricPress seen(const Calibration& calibration, const BallPresses& set,
                     const BallPresses::Press& press, const PressAsymmetry& gain) {
   const SettledPress settled =
@@ -84,7 +84,7 @@ SymmetricPress seen(const Calibration& calibration, const BallPresses& set,
   return without_asymmetry(settled.map, settled.contact, gain);
 }
 
-/// Spread of the deepest press that a gel was fitted to.
+/// Spread of the deepest press to which a gel was fitted.
 double spread_of(const FittedCalibration& fitted, const BallPresses& set) {
   const auto deepest = std::ranges::max_element(fitted.presses, {}, &PressReport::Depth::depth_mm);
   const auto press = std::ranges::find(set.presses, deepest->name, &BallPresses::Press::name);
@@ -96,7 +96,7 @@ double spread_of(const FittedCalibration& fitted, const BallPresses& set) {
   return depth_spread_mm(levels, optics, fitted.fit);
 }
 
-/// Those of the gel, and in squares how far the two LUTs are apart at the depth.
+/// Uncertainty of the gel's LUT, plus, in squares, the distance of the two LUTs at the depth.
 std::vector<recon::Model::Uncertainty> uncertainty_of(const recon::DepthLut& constrained,
                                                       const GelLut& gel,
                                                       const recon::Model& of_gel) {
@@ -116,8 +116,8 @@ void add_line(std::string& note, const std::string& line) {
   note += (note.empty() ? "" : "\n") + line;
 }
 
-/// "; the gel itself leaves 0.200 grey levels", and what that may be by noise alone: a single
-/// image's is more than explains() allows.
+/// "; the gel itself leaves 0.200 grey levels", and whether noise alone may cause that: a single
+/// image's noise is more than explains() allows.
 std::string left_by(const FittedCalibration& fitted, const BallPresses& set) {
   constexpr std::size_t kEnough = 10;  // images whose mean has too little noise to matter
   const bool few = std::ranges::any_of(
@@ -160,7 +160,7 @@ Calibration chained_at(const FittedCalibration& fitted, const BallPresses& set,
     const auto press = std::ranges::find(at_depths.presses, used.name, &BallPresses::Press::name);
     press->depth_mm = used.depth_mm;
   }
-  // The presses that the gel was not fitted to are left out there, too, and named.
+  // The presses to which the gel was not fitted are left out there, too, and named.
   Calibration made = build(at_depths, &report);
   add_line(report.note,
            "LUT: what the presses show, at the depths of a gel" + left_by(fitted, set));

@@ -16,8 +16,8 @@ namespace dtact::calibration {
 namespace {
 
 constexpr Eigen::Index kHats = 36;
-/// Beyond the edge the surface leaves the ball with the power 3/2 of the distance: on places that
-/// go with the square of the index it is smooth.
+/// Beyond the edge the surface leaves the ball with the power 3/2 of the distance: on positions
+/// that grow with the square of the index it is smooth.
 constexpr Eigen::Index kOutside = 96;
 constexpr double kFarthest = 14;  // radii
 
@@ -26,13 +26,13 @@ double outside_place(double index) {
   return 1 + (kFarthest - 1) * part * part;
 }
 
-/// What a gel of thickness x / k differs by from a half-space, of that one's answer:
+/// The relative difference of the response of a gel of thickness x / k from a half-space's:
 /// (sinh 2x − 2x) / (cosh 2x + 1 + 2x²) − 1, written without cancellation.
 double layer_minus_half_space(double x) {
   return -(std::exp(-2 * x) + 2 * x + 1 + 2 * x * x) / (std::cosh(2 * x) + 1 + 2 * x * x);
 }
 
-/// Where that has fallen to 1e-9.
+/// Argument at which that has fallen to 1e-9.
 constexpr double kNoGelLeft = 13;
 
 double knot(Eigen::Index j) {
@@ -57,7 +57,7 @@ double over_hat(Eigen::Index j, const Kernel& kernel, const Points& points) {
   return sum;
 }
 
-/// Points for an integrand with a logarithm at `pole`: panels that halve towards it.
+/// Points for an integrand with a logarithm at `pole`: panels halve towards it.
 template <typename Add>
 void for_points_about(double pole, double from, double to, const Add& add) {
   if (from < pole && pole < to) {
@@ -71,7 +71,7 @@ void for_points_about(double pole, double from, double to, const Add& add) {
   const double gap = std::abs(near - pole);
   double outer = far;
   // A panel no longer than its distance from the pole is smooth enough; the last one, 2^-20 of the
-  // first, holds nothing.
+  // first, is negligible.
   for (int halvings = 0; halvings < 20 && std::abs(outer - near) > gap; ++halvings) {
     const double inner = near + 0.5 * (outer - near);
     for_gauss_points(std::min(inner, outer), std::max(inner, outer), add);
@@ -80,7 +80,7 @@ void for_points_about(double pole, double from, double to, const Add& add) {
   for_gauss_points(std::min(near, outer), std::max(near, outer), add);
 }
 
-/// A half-space's answer at ρ to hat j, without the factor 3/2·a:
+/// A half-space's response at ρ to hat j, without the factor 3/2·a:
 /// ∫ hat(s)·s·∫ J₀(κρ)·J₀(κs) dκ ds, the inner one 2/(π·max)·K(min/max) (Gradshteyn and Ryzhik
 /// 6.512).
 double half_space(Eigen::Index j, double rho) {
@@ -93,13 +93,13 @@ double half_space(Eigen::Index j, double rho) {
   });
 }
 
-/// All that does not depend on the press: lengths in contact radii.
+/// Everything that does not depend on the press: lengths in contact radii.
 struct Matrices {
   Eigen::VectorXd kappa;      ///< Wave numbers, ascending.
   Eigen::VectorXd weight;     ///< Quadrature weights over them.
   Eigen::MatrixXd transform;  ///< Hankel transform of each hat, a column each.
   Eigen::MatrixXd inside;     ///< J₀(κρ) at the knots, a column each.
-  Eigen::MatrixXd outside;    ///< And beyond.
+  Eigen::MatrixXd outside;    ///< The same beyond.
   Eigen::MatrixXd half_inside;
   Eigen::MatrixXd half_outside;
 
@@ -134,8 +134,8 @@ struct Matrices {
 
  private:
   void lay_out_kappa() {
-    // Narrow panels for thick gels, whose answer lives at small wave numbers, wide ones up to
-    // where the thinnest is a half-space; J₀ at the farthest place turns once a panel.
+    // Narrow panels for thick gels, whose response is at small wave numbers, wide ones up to
+    // where the thinnest is a half-space; J₀ at the farthest position turns once a panel.
     std::vector<double> nodes;
     std::vector<double> weights;
     const double last = kNoGelLeft / kMinGelThicknessMm;
@@ -184,8 +184,8 @@ double BallContact::indentation_mm(double r_mm) const {
   if (r_mm <= contact_radius_mm) return depth_mm - sag(ball_radius_mm, r_mm);
   const double part = (r_mm / contact_radius_mm - 1) / (kFarthest - 1);
   if (part >= 1) return 0;
-  // The index goes with the root of the distance: to the other side of the edge it is an even
-  // function of it up to the power 3/2.
+  // The index is proportional to the root of the distance: to the other side of the edge it is an
+  // even function of it up to the power 3/2.
   return cubic(outside_mm, std::sqrt(part) * static_cast<double>(kOutside - 1), outside_mm[1]);
 }
 
@@ -227,8 +227,8 @@ BallContact press_ball_to(double ball_radius_mm, double depth_mm, double thickne
   const double least = 1.001 * thickness_mm / kMaxGelThicknessMm;
   const double most =
       0.999 * std::min(kWidestContact * ball_radius_mm, thickness_mm / kMinGelThicknessMm);
-  // About as wide as the circle that the undeformed surface cuts out of the ball. Depth goes with
-  // the square of the radius, less on a thin gel, so that each step leaves a part of the error.
+  // About as wide as the circle that the undeformed surface cuts out of the ball. Depth grows with
+  // the square of the radius, less on a thin gel, so each step leaves a part of the error.
   double radius = std::sqrt(depth_mm * std::max(0.0, 2 * ball_radius_mm - depth_mm));
   for (int i = 0;; ++i) {
     radius = std::clamp(radius, least, most);

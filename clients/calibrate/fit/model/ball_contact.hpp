@@ -16,26 +16,26 @@ struct BallContact {
   [[nodiscard]] double indentation_mm(double r_mm) const;
 };
 
-/// Greatest contact radius, of the ball's; and the range of thicknesses in contact radii for which
+/// Greatest contact radius in ball radii, and the range of thicknesses in contact radii for which
 /// the matrices were laid out.
 inline constexpr double kWidestContact = 0.97;
 inline constexpr double kMinGelThicknessMm = 0.2;
 inline constexpr double kMaxGelThicknessMm = 12;
 
-/// The contact of a given radius. The surface answers a pressure p with û(k) = C(k)·p̂(k),
+/// The contact of a given radius. The surface responds to a pressure p with û(k) = C(k)·p̂(k),
 ///
 ///     C(k) = 3/(2·E·k) · (sinh 2kh − 2kh) / (cosh 2kh + 1 + 2(kh)²)
 ///
 /// (K. L. Johnson, Contact Mechanics, section 5.8, ν = 0.5). The pressure is a sum of hat functions
-/// on the knots sin(πj/2N) of the contact radius, N = 36, which lie close where it falls to
-/// nothing; that it is zero at the edge says how deep the ball is. In units of the radius
+/// on the knots sin(πj/2N) of the contact radius, N = 36, which are dense where it falls to
+/// zero; that it is zero at the edge determines the depth. In units of the radius
 /// everything but kh is fixed, so the Hankel transforms are matrices made once. E cancels.
 ///
 /// Throws std::invalid_argument outside the ranges above.
 [[nodiscard]] BallContact press_ball(double ball_radius_mm, double contact_radius_mm,
                                      double thickness_mm);
 
-/// The contact of a ball pressed so deep, to 1e-4 mm; at most as wide as
+/// The contact of a ball pressed `depth_mm` deep, to 1e-4 mm; at most as wide as
 /// kWidestContact and kMinGelThicknessMm allow.
 [[nodiscard]] BallContact press_ball_to(double ball_radius_mm, double depth_mm,
                                         double thickness_mm);

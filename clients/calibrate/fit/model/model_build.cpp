@@ -18,13 +18,13 @@ namespace dtact::calibration {
 namespace {
 
 constexpr double kMaxResidual = 0.5;  // grey levels
-/// Grey levels themselves are taken for shares of the light where that leaves so much less: on
+/// Grey levels count as shares of the light where that leaves at most this part of the error: on
 /// sensor_a 0.7 of the error, on sensor_b 1.02 (half-disc); in the simulator it is a share.
 constexpr double kRounder = 0.8;
 constexpr double kDeepest = 0.92;           // of the thickness
 constexpr double kReportedDarkening = 0.5;  // grey levels of a press's offset
 
-/// Mean of the reference over what is not dark: what GainShape::uniform brings darkening to.
+/// Mean of the reference without its dark parts: GainShape::uniform normalises darkening to it.
 double light_of(const recon::RectifyTable& table, const image::Grey16& reference_q8) {
   double sum = 0;
   double count = 0;
@@ -36,7 +36,7 @@ double light_of(const recon::RectifyTable& table, const image::Grey16& reference
   return count > 0 ? sum / count : 0;
 }
 
-/// How far the contacts are from round in the picture: root mean square distance from the mean at
+/// Asymmetry of the contacts in the picture: root mean square distance from the mean at
 /// each radius over the peak's level, over all presses.
 double lopsided(std::span<const SettledPress> presses) {
   double sum = 0;
@@ -58,7 +58,7 @@ double lopsided(std::span<const SettledPress> presses) {
   return std::sqrt(sum / count);
 }
 
-/// The presses in which a contact is found, and the names of the others with reasons.
+/// The presses with a contact, and the names of the others with reasons.
 struct UsablePresses {
   std::vector<SettledPress> presses;
   std::vector<std::string> names;
@@ -79,7 +79,7 @@ UsablePresses look(const recon::Model& model, const BallPresses& set) {
   return seen;
 }
 
-/// A press is found at two places: something dark is taken for the ball.
+/// A press is found at two positions: a dark part passes as the ball.
 bool disagree(const UsablePresses& seen, const UsablePresses& shares, double mm_per_px) {
   for (std::size_t i = 0; i < seen.names.size(); ++i) {
     const auto same = std::ranges::find(shares.names, seen.names[i]);
@@ -109,14 +109,14 @@ void refuse(const FittedCalibration& made) {
   }
 }
 
-/// The fit with its errors, carried from logarithms to what they stand for.
+/// The fit with its errors, converted from logarithms.
 GelEstimate describe(const ModelFit& fit, double light_levels) {
   const auto deviation = [&](Eigen::Index i) { return std::sqrt(fit.covariance(i, i)); };
   const recon::Scattering& scattering = fit.gel.scattering;
   const double weight = scattering.narrow_weight;
   GelEstimate gel;
   gel.thickness_mm = {fit.gel.thickness_mm, fit.gel.thickness_mm * deviation(ModelFit::kThickness)};
-  // The fit does not mind which of its two widths is the narrow one; gel_of() does.
+  // The fit does not distinguish its two widths; gel_of() sorts them.
   const bool crossed = fit.parameters[ModelFit::kNarrow] > fit.parameters[ModelFit::kWide];
   const auto narrow = crossed ? ModelFit::kWide : ModelFit::kNarrow;
   const auto wide = crossed ? ModelFit::kNarrow : ModelFit::kWide;
@@ -141,8 +141,8 @@ std::string FittedCalibration::describe_press() const {
   const double darker = fit.presses.front().offset * light_levels;
   if (std::abs(darker) > kReportedDarkening) {
     text += fmt::format(
-        "\nlight: far from the ball the picture is {:.1f} grey levels {} than untouched, which no "
-        "gel does; the LUT was made without them",
+        "\nlight: far from the ball the picture is {:.1f} grey levels {} than the reference; no "
+        "gel does that, so the LUT was made without them",
         std::abs(darker), darker > 0 ? "darker" : "brighter");
   }
   return text;
@@ -156,8 +156,8 @@ FittedCalibration build_model(const BallPresses& set, const recon::FlatFieldGain
   model->gain = gain_on_map(gain, made.calibration);
   UsablePresses seen = look(*model, set);
   if (!set.gain_specified && gain.shape == recon::GainShape::none && gain.polynomial.empty()) {
-    // The loss is a share of the light. Rings do not tell whether a sensor's picture is one, but
-    // where it is not, a share of uneven light makes a round dent lopsided.
+    // The loss is a share of the light. Rings do not show whether a sensor's picture is one, but
+    // where it is not, a share of uneven light makes a round dent asymmetric.
     recon::Model uniform = *model;
     uniform.gain.shape = recon::GainShape::uniform;
     UsablePresses shares = look(uniform, set);
@@ -183,7 +183,7 @@ FittedCalibration build_model(const BallPresses& set, const recon::FlatFieldGain
         profile_of(without_asymmetry(press.map, press.contact, made.press_asymmetries.back().gain),
                    optics.light_levels, optics.smoothing_mm));
   }
-  // What does not fit one press fits several even less, and costs as much for each.
+  // A misfit for one press is worse for several, and each costs as much time.
   const auto deepest = std::ranges::max_element(
       seen.presses, {}, [](const SettledPress& press) { return press.contact.peak_levels; });
   made.fit = fit_model({&profiles[static_cast<std::size_t>(deepest - seen.presses.begin())], 1});

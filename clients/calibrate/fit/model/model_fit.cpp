@@ -25,8 +25,8 @@ using enum ModelFit::Parameter;
 enum Own : int { kRadius, kOffset, kOwnCount };
 
 constexpr std::array<double, 3> kStartThicknesses = {1.5, 2, 2.8};
-/// What a ring's mean may be off by that no parameter explains: where the fit begins, and the least
-/// that is believed. Shares of the light.
+/// Unexplained error of a ring's mean: start value of the fit, and the smallest value that
+/// it uses. Shares of the light.
 constexpr double kFirstUncertainty = 1e-3;
 constexpr double kMinUncertainty = 6e-5;
 constexpr int kMaxIterations = 30;
@@ -46,7 +46,7 @@ GelModel gel_from(std::span<const double> x) {
   return gel;
 }
 
-/// One press's rings against what the model makes of it.
+/// One press's rings against the model's prediction.
 class RingCost {
  public:
   RingCost(const PressProfile& press, double doubt, std::size_t shared)
@@ -70,7 +70,7 @@ class RingCost {
   }
 
  private:
-  /// The contact is solved anew only when its radius or the thickness moved, and the loss only when
+  /// Solves the contact only when its radius or the thickness moved, and the loss only when
   /// they or the response did: half of the derivatives need neither.
   bool press(double radius_mm, const GelModel& gel) const {
     const bool same_contact = contact_ && contact_->contact_radius_mm == radius_mm &&
@@ -101,7 +101,7 @@ class RingCost {
 
 /// Rows (x − mean)/deviation, and of differences between slopes.
 ceres::CostFunction* shared_prior(std::size_t count) {
-  // Slopes of the loss a thickness: inside the contact 31 grey levels of 161 a mm on 2 mm, on the
+  // Slopes of the loss per thickness: inside the contact 31 grey levels of 161 a mm on 2 mm, on the
   // bulge about three times as steep (real images of one sensor).
   constexpr std::array<double, 10> kMean = {0.693, -1.2, 0.405, 1.1, 0.2, 0.0, -0.8, -0.9, -0.9, 0};
   constexpr std::array<double, 10> kDeviation = {0.35, 0.5, 0.5, 1, 1.2, 1.2, 0.8, 0.8, 0.8, 0.3};
@@ -120,7 +120,7 @@ ceres::CostFunction* shared_prior(std::size_t count) {
   return new ceres::NormalPrior(rows, mean);  // the problem owns it
 }
 
-/// Parameters of one try.
+/// Parameters of one attempt.
 struct State {
   std::vector<double> shared;
   std::vector<std::array<double, kOwnCount>> own;
@@ -172,7 +172,7 @@ double mean_square(std::span<const double> residuals) {
   return sum / static_cast<double>(residuals.size());
 }
 
-/// The fit from a first solution, each ring believed as far as it deserves.
+/// Repeats the fit from a first solution, with each ring weighted by its error.
 ModelFit refine(std::span<const PressProfile> presses, State best) {
   if (best.cost == std::numeric_limits<double>::infinity()) {
     throw ModelRefused(

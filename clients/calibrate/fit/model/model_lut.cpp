@@ -20,13 +20,13 @@ namespace {
 
 constexpr std::array<double, 7> kBalls = {1.5, 2, 3, 4, 5, 6, 8};  // mm
 constexpr int kDepths = 8;
-/// Beyond it the linear gel is no model of a real one, nor the response known.
+/// Beyond it the linear gel does not describe a real one, and the response is unknown.
 constexpr double kMaxGelShare = 0.92;
 constexpr double kKnotLevels = 2;
 constexpr double kTrustedBeyond = 2;  // grey levels
 constexpr int kDraws = 20;
 
-/// A ball as the maps of all LUTs show it, on RadialTransform's grid.
+/// A ball in the maps of all LUTs, on RadialTransform's grid.
 struct Shown {
   Eigen::VectorXd indentation_mm;
   std::array<Eigen::VectorXd, kLuts> levels;
@@ -34,7 +34,7 @@ struct Shown {
   double contact_radius_mm = 0;
 };
 
-/// What each LUT's map keeps of every wave number of a loss. The filter may believe in another
+/// The factor of each LUT's map on every wave number of a loss. The filter may assume another
 /// scattering than the gel's.
 std::array<Eigen::VectorXd, kLuts> transfers(const recon::Scattering& scattering,
                                              const recon::Scattering& believed,
@@ -60,7 +60,7 @@ Shown show(const GelModel& gel, const BallContact& contact,
   return shown;
 }
 
-/// Balls of every size at every depth on a gel.
+/// Computes balls of every size at every depth on a gel.
 std::vector<Shown> show_balls(const GelModel& gel, const MapOptics& optics, double deepest_mm) {
   const auto light = transfers(gel.scattering, gel.scattering, optics);
   std::vector<Shown> balls;
@@ -74,22 +74,22 @@ std::vector<Shown> show_balls(const GelModel& gel, const MapOptics& optics, doub
   return balls;
 }
 
-/// Calls `add(level, indentation, weight)` for the places of a ball that make a LUT: where it
-/// touches, and the bulge around. Every place weighs the same.
+/// Calls `add(level, indentation, weight)` for the points of a ball that make a LUT: the
+/// contact, and the bulge around. Every point has the same weight.
 template <typename Add>
 void for_places(const Shown& ball, std::size_t lut, const Add& add) {
   const Eigen::VectorXd& levels = ball.levels[lut];
   const double a = ball.contact_radius_mm;
   for (Eigen::Index i = 0; i < RadialTransform::kPoints; ++i) {
     const double r = RadialTransform::kStepMm * static_cast<double>(i);
-    const bool touches = r <= a;
-    if (!touches && (levels[i] >= 0 || r > 4 * a)) continue;
+    const bool in_contact = r <= a;
+    if (!in_contact && (levels[i] >= 0 || r > 4 * a)) continue;
     add(levels[i], ball.indentation_mm[i], r);
   }
 }
 
 struct Knots {
-  int first = 0;  ///< Index: the knot is at `first`·kKnotLevels.
+  int first = 0;  ///< Index; the knot is at `first`·kKnotLevels.
   Eigen::VectorXd depth_mm;
 
   [[nodiscard]] double at(double level) const {
@@ -97,8 +97,8 @@ struct Knots {
   }
 };
 
-/// Straight lines between knots by least squares, zero at zero, held straight where few places say
-/// anything, rising.
+/// Straight lines between knots by least squares, zero at zero, kept straight where few points are,
+/// rising.
 Knots fit_knots(const std::vector<Shown>& balls, std::size_t lut) {
   double low = 0;
   double high = 0;
@@ -120,7 +120,7 @@ Knots fit_knots(const std::vector<Shown>& balls, std::size_t lut) {
       squares.add({{below, 1 - part}, {below + 1, part}}, depth, weight);
     });
   }
-  // The gel answers otherwise on either side of zero.
+  // The gel responds differently on either side of zero.
   const double stiff = 0.02 * squares.trace() / static_cast<double>(count);
   squares.straighten(0, zero + 1, stiff);
   squares.straighten(zero, count - zero, stiff);
@@ -170,7 +170,7 @@ double noise_levels(const GelModel& gel, const MapOptics& optics, int steps) {
   return kFrameNoise * optics.mm_per_px * std::sqrt(sum / (2 * std::numbers::pi));
 }
 
-/// Every third ball on gels drawn from the covariance, in contacts as wide as on the fitted one.
+/// Every third ball on gels drawn from the covariance, with contacts as wide as on the fitted one.
 std::vector<Shown> show_drawn(const ModelFit& fit, const MapOptics& optics,
                               const std::vector<Shown>& balls) {
   const Eigen::MatrixXd root = fit.covariance.llt().matrixL();

@@ -9,27 +9,27 @@
 
 namespace dtact::calibration {
 
-/// How the map that a LUT is asked about is made of the camera's image.
+/// How the map that a LUT reads is made from the camera's image.
 struct MapOptics {
-  double light_levels = 0;  ///< Grey level that counts as all of the light.
+  double light_levels = 0;  ///< Grey level of full light.
   double smoothing_mm = 0;
   double mm_per_px = 0;
 };
 
-/// A LUT and what it is uncertain by.
+/// A LUT and its uncertainty.
 struct ModelLut {
   recon::DepthLut lut;
   std::vector<recon::Model::Uncertainty> uncertainty;
 };
 
-/// One for each number of steps of the filter that takes the scattering back, none first
+/// Number of LUTs: one for each number of steps of the sharpening filter, none first
 /// (sharpened()).
 inline constexpr int kLuts = recon::kMaxSharpeningSteps + 1;
 
-/// The mean indentation over balls of 1.5 to 8 mm radius, pressed to all depths up to `deepest_mm`
-/// into the gel, of what the map shows of them. Inverting the response alone would be biased,
-/// since what a place shows depends on what lies beside it. Nothing shown is no indentation; the
-/// LUT rises throughout. It covers what the balls show and two grey levels beyond the deepest.
+/// LUTs from the map's pictures of balls of 1.5 to 8 mm radius, pressed to all depths up to
+/// `deepest_mm` into the gel: the mean indentation at each level. Inverting the response only would
+/// be biased, since each point depends on its surroundings. No darkening is no indentation; the LUT
+/// rises throughout. It covers the balls' levels and two grey levels beyond the deepest.
 [[nodiscard]] std::array<recon::DepthLut, kLuts> luts_of(const GelModel& gel,
                                                          const MapOptics& optics,
                                                          double deepest_mm);

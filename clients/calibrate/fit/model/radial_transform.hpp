@@ -27,7 +27,7 @@ void for_gauss_points(double from, double to, const Add& add) {
 
 /// Functions of the distance from an axis, from 0 to 14 mm, and their Hankel transforms, in which a
 /// blur is a product. Between the grid's points a function is a straight line; beyond the last it
-/// is nothing. Wave numbers reach so far that a blur of 0.15 mm and more is complete to 1e-3 of a
+/// is zero. The range of wave numbers represents a blur of at least 0.15 mm to within 1e-3 of a
 /// step's height.
 class RadialTransform {
  public:
@@ -44,11 +44,11 @@ class RadialTransform {
   [[nodiscard]] Eigen::VectorXd transform(const Eigen::VectorXd& values) const {
     return forward_ * values;
   }
-  /// Back, to the same places.
+  /// The inverse, at the same positions.
   [[nodiscard]] Eigen::VectorXd values(const Eigen::VectorXd& spectrum) const {
     return back_ * spectrum;
   }
-  /// The matrix that takes a spectrum back to other places, millimetres.
+  /// The matrix that transforms a spectrum to other positions, millimetres.
   [[nodiscard]] Eigen::MatrixXd back_to(std::span<const double> places_mm) const;
 
  private:
