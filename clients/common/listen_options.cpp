@@ -15,8 +15,7 @@ void add_listen_options(CLI::App& command, net::NetConfig& settings) {
       ->check(CLI::Range(0, 65535));
   command
       .add_option("--tokens", settings.token_file,
-                  "Whoever connects needs one of these tokens: a file like the daemon's "
-                  "net.tokens")
+                  "Clients need one of these tokens: a file like the daemon's net.tokens")
       ->type_name("FILE");
   command
       .add_option("--tls-certificate", settings.tls_certificate,

@@ -23,9 +23,7 @@ std::string name_of(v1::TimestampMeaning meaning) {
   return plain(v1::TimestampMeaning_Name(meaning), "TIMESTAMP_", meaning);
 }
 
-std::string name_of(v1::Health condition) {
-  return plain(v1::Health_Name(condition), "HEALTH_", condition);
-}
+std::string name_of(v1::Health flag) { return plain(v1::Health_Name(flag), "HEALTH_", flag); }
 
 std::string name_of(v1::ForceAbsence absence) {
   return plain(v1::ForceAbsence_Name(absence), "FORCE_ABSENCE_", absence);

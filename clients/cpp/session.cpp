@@ -57,8 +57,7 @@ v1::Hello hello_for(const Options& options, const Connection& connection) {
   return hello;
 }
 
-/// A call in progress. Throws Error where it could not be told from another one on the same
-/// connection.
+/// A call in progress. Throws Error after a fork, or while another thread is in a call.
 class Session::Call {
  public:
   explicit Call(Session& session) : session_(session) {

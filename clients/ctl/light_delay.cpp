@@ -122,8 +122,8 @@ class Measurement {
 
   static cli::Failure restless() {
     return failure(
-        "the picture does not come to rest: lift what touches the sensor; where nothing does, the "
-        "camera's exposure or gain runs automatically (dtactctl status shows its controls)");
+        "the picture does not come to rest: free the sensor's surface; if it is free, the camera's "
+        "exposure or gain runs automatically (dtactctl status shows its controls)");
   }
 
   std::uint32_t step(const v1::LightState& from, const v1::LightState& to) {

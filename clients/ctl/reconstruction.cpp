@@ -24,7 +24,7 @@ v1::Reconstruction run(const Context& context, const ReconstructionOptions& opti
     const v1::Status status = client.status();
     if (status.has_reconstruction()) return status.reconstruction();
     throw client::Refused(v1::ERROR_UNSUPPORTED,
-                          "this daemon does not tell how it makes depth: update dtactd");
+                          "this daemon does not report its reconstruction: update dtactd");
   }
   v1::SetReconstruction change;
   if (options.resolution) change.set_resolution(*options.resolution);
@@ -45,7 +45,7 @@ void add_reconstruction(CLI::App& app, Context& context) {
                       "The map's share of the calibration's resolution: full, half, quarter, or "
                       "auto: the coarsest within --max-error-um, for each frame");
   command->add_option("--sharpen", options->sharpen,
-                      "Steps of the filter that undoes the gel's blur: off, 1, 2, or auto: the "
+                      "Steps of sharpening against the gel's blur: off, 1, 2, or auto: the "
                       "fewest within --max-error-um, for each frame");
   command
       ->add_option("--max-error-um", options->max_error_um,

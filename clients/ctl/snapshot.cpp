@@ -77,11 +77,11 @@ void run_snapshot(const Context& context, const SnapshotOptions& options) {
     *report.mutable_frame() = std::move(frame);
     context.out << cli::json_line(report);
   } else {
-    const auto conditions = client::names_of(frame.health());
-    context.out << fmt::format(
-        "{}: frame {}, deepest {:.3f} mm, contact {:.1f} mm2{}\n", options.output, frame.sequence(),
-        frame.contact().deepest_mm(), frame.contact().area_mm2(),
-        conditions.empty() ? "" : fmt::format(", {}", fmt::join(conditions, ", ")));
+    const auto flags = client::names_of(frame.health());
+    context.out << fmt::format("{}: frame {}, deepest {:.3f} mm, contact {:.1f} mm2{}\n",
+                               options.output, frame.sequence(), frame.contact().deepest_mm(),
+                               frame.contact().area_mm2(),
+                               flags.empty() ? "" : fmt::format(", {}", fmt::join(flags, ", ")));
   }
 }
 

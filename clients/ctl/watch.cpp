@@ -181,13 +181,13 @@ class Watch {
                                     latency.percentile_ms(0.5), latency.percentile_ms(0.99),
                                     client::name_of(last_.meaning()));
       }
-      std::string conditions;
-      for (const v1::Health condition : all_.health()) {
-        conditions += (conditions.empty() ? "" : ", ") + client::name_of(condition);
+      std::string flags;
+      for (const v1::Health flag : all_.health()) {
+        flags += (flags.empty() ? "" : ", ") + client::name_of(flag);
       }
       context_.out << fmt::format("deepest {:.3f} mm; {} dropped; health flags: {}\n",
                                   all_.deepest_mm(), last_.dropped(),
-                                  conditions.empty() ? "none" : conditions);
+                                  flags.empty() ? "none" : flags);
     }
     if (fps < options_.min_fps) {
       throw cli::Failure(cli::kNotMet,

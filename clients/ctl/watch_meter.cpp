@@ -16,7 +16,7 @@ void WatchMeter::add(const v1::Frame& frame, std::int64_t now_ns, bool same_cloc
   }
   if (same_clock) latency_.add(now_ns - frame.monotonic_ns());
   deepest_mm_ = std::max(deepest_mm_, frame.contact().deepest_mm());
-  for (const int condition : frame.health()) health_.insert(static_cast<v1::Health>(condition));
+  for (const int flag : frame.health()) health_.insert(static_cast<v1::Health>(flag));
 }
 
 void WatchMeter::reset() { *this = WatchMeter(); }
@@ -63,7 +63,7 @@ cli::WatchReport watch_report(const WatchMeter& meter, const v1::Frame& last) {
     report.set_latency_p99_ms(latency.percentile_ms(0.99));
   }
   report.set_deepest_mm(meter.deepest_mm());
-  for (const v1::Health condition : meter.health()) report.add_health(condition);
+  for (const v1::Health flag : meter.health()) report.add_health(flag);
   *report.mutable_newest() = last;
   return report;
 }

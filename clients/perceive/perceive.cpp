@@ -42,7 +42,7 @@ void serve(const cli::Context& context, const Settings& settings) {
     if (object->spacing > kCoarse) {
       config.log({net::LogLevel::warning,
                   fmt::format("{} is large: its places are more than {} mm apart, and it may be "
-                              "found where it is not; give the part of it that touches",
+                              "found where it is not; give only the part in contact",
                               object->name, 1e3 * kCoarse)});
     }
   }
@@ -72,8 +72,8 @@ void add_serve(CLI::App& app, cli::Context& context) {
   command
       ->add_option(
           "--object", settings->object,
-          "The touched object's shape: poses are then its place in the sensor's frame, not "
-          "the motion since it was touched. STL, PLY with faces, or a PLY cloud with outward "
+          "The shape of the object in contact: poses are then its place in the sensor's frame, "
+          "not the motion since first contact. STL, PLY with faces, or a PLY cloud with outward "
           "normals, of at most 64 MiB")
       ->type_name("FILE");
   command->add_option("--object-unit", settings->object_unit, "Of the lengths in that file")
@@ -87,9 +87,8 @@ void add_serve(CLI::App& app, cli::Context& context) {
 void set_up(CLI::App& app, cli::Context& context) {
   app.name("dtact-perceive")
       ->description(
-          "Makes point clouds of what a DTact tactile sensor touches, and follows how it moves: "
-          "from "
-          "the frames of dtactd, on the same wire, only during contact.");
+          "Outputs point clouds of the contact on a DTact tactile sensor and tracks its motion: "
+          "from the frames of dtactd, on the same wire, only during contact.");
   cli::add_global_options(app, context);
   add_serve(app, context);
   add_watch(app, context);

@@ -26,7 +26,7 @@ class RecordingWriter {
   /// With its JPEG, if it has one, which is stored on a channel of its own.
   void add(v1::Frame frame);
   void add(const v1::Event& event);
-  /// Stored with the time of the last frame or event; there must be one. attach() likewise.
+  /// Both store with the time of the last frame or event; there must be one.
   void add(const v1::Status& status);
   void attach(const std::string& name, const std::string& media_type, const std::string& data);
 

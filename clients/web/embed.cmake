@@ -36,5 +36,5 @@ ${body}}
 
 }  // namespace dtact::web
 ")
-# The bytes that .incbin takes are no dependency that a compiler tells of: always a new file.
+# Compilers do not report the file of .incbin as a dependency: always a new file.
 file(RENAME ${OUT}.new ${OUT})

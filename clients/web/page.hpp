@@ -24,14 +24,14 @@ class Page {
   Page(const Page&) = delete;
   Page& operator=(const Page&) = delete;
 
-  /// What lies at a path like "/app.js"; "/" is index.html. Null: nothing does.
+  /// The file at a path like "/app.js"; "/" is index.html. Null: no file.
   [[nodiscard]] const File* find(std::string_view path) const;
   [[nodiscard]] bool empty() const noexcept { return files_.empty(); }
 
  private:
   void add(const std::string& name, std::string_view bytes);
 
-  std::map<std::string, std::string> read_;         ///< Of the folder: what the files' bytes are.
+  std::map<std::string, std::string> read_;         ///< Contents of the folder's files.
   std::map<std::string, File, std::less<>> files_;  ///< By path.
 };
 

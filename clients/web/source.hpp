@@ -86,7 +86,7 @@ class Source : public std::enable_shared_from_this<Source> {
   [[nodiscard]] std::shared_ptr<Feed> open(std::uint64_t stream, const v1::Subscribe& request);
   [[nodiscard]] Stream* find(std::uint64_t stream);
   [[nodiscard]] v1::Reply away() const;
-  /// Tells those of a stream who wait for it, and takes them off their others when it flows.
+  /// Answers the clients that wait for a stream; once it flows, ends their other streams.
   void settle(Stream& stream, const v1::Reply& reply);
   void retire_empty();
   void notify_all();

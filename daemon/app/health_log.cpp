@@ -38,7 +38,7 @@ std::vector<HealthLog::Line> HealthLog::step(const pipeline::Status& status, Tim
   std::vector<Line> lines;
   for (int i = 0; i < pipeline::kHealthCount; ++i) {
     const auto health = static_cast<Health>(i);
-    Condition& flag = health_flags_.at(static_cast<std::size_t>(i));
+    Flag& flag = health_flags_.at(static_cast<std::size_t>(i));
     const bool on = status.health.has(health);
     if (on && !flag.on) {
       if (std::exchange(flag.known, false)) {

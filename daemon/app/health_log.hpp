@@ -29,14 +29,14 @@ class HealthLog {
   [[nodiscard]] std::vector<Line> step(const pipeline::Status& status, Time now);
 
  private:
-  struct Condition {
+  struct Flag {
     bool known = false;  ///< The log has announced its start.
     bool on = false;
     bool reported = false;  ///< Its start has been logged, its end not yet.
-    unsigned times = 0;     ///< It began, untold.
+    unsigned times = 0;     ///< Starts since the last line.
     Time last = Time::min();
   };
-  std::array<Condition, pipeline::kHealthCount> health_flags_{};
+  std::array<Flag, pipeline::kHealthCount> health_flags_{};
 };
 
 }  // namespace dtact::app

@@ -9,7 +9,7 @@
 
 namespace dtact::app {
 
-/// Fields of a log line beside its text, for `journalctl DTACT_CONDITION=camera_fault`. Names as
+/// Fields of a log line beside its text, for `journalctl DTACT_HEALTH=camera_fault`. Names as
 /// in systemd.journal-fields(7); what is empty is left out.
 using LogFields = std::vector<std::pair<const char*, std::string>>;
 

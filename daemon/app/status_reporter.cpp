@@ -49,7 +49,7 @@ void StatusReporter::wait() {
     if (reported_ != text && notify_status(text)) reported_ = text;
     for (const auto& line : health_flags_.step(status, std::chrono::steady_clock::now())) {
       log_line(line.warning ? spdlog::level::warn : spdlog::level::info, line.text,
-               {{"DTACT_CONDITION", line.flag}});
+               {{"DTACT_HEALTH", line.flag}});
     }
     wait();
   });

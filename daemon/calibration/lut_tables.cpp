@@ -56,7 +56,7 @@ recon::Scattering read_scattering(KeyReader reader) {
 void read_sharpened(KeyReader& top, recon::Model& model) {
   for (KeyReader& reader : top.tables("sharpened")) {
     if (model.method != recon::Method::lut) {
-      reader.fail("", "method \"published\" has no such LUTs; remove the table");
+      reader.fail("", "method \"published\" has no sharpened LUTs; remove the table");
     }
     if (!model.scattering) {
       reader.fail("",

@@ -78,7 +78,7 @@ void add_state(Families& to, const v1::Status& status) {
     to.add(status.state() == state ? 1 : 0,
            {{"state", short_name(v1::State_Name(static_cast<v1::State>(state)))}});
   }
-  to.begin("dtactd_health_flag", "1 while depth deserves less trust under this condition.",
+  to.begin("dtactd_health_flag", "1 while this health flag is set: depth deserves less trust.",
            MetricType::Gauge);
   for (int one = v1::HEALTH_NONE + 1; v1::Health_IsValid(one); ++one) {
     const auto flag = static_cast<v1::Health>(one);
@@ -91,7 +91,7 @@ void add_frames(Families& to, const net::Overview& overview) {
   const v1::CameraStatus& camera = status.camera();
   to.counter("dtactd_frames_total", "Frames published by the capture loop.", status.frames());
   to.gauge("dtactd_frames_per_second",
-           "Frames that passed the capture loop within the last second, whoever wanted them.",
+           "Frames that passed the capture loop within the last second, subscribed or not.",
            status.fps());
   to.begin(
       "dtactd_frames_dropped_total",
@@ -121,7 +121,7 @@ void add_camera(Families& to, const v1::CameraStatus& camera) {
           {{"backend", camera.backend()},
            {"identity", camera.identity()},
            {"pixel_format", camera.pixel_format()}});
-  to.begin("dtactd_camera_state", "1 for the condition that the camera is in.", MetricType::Gauge);
+  to.begin("dtactd_camera_state", "1 for the state that the camera is in.", MetricType::Gauge);
   for (const char* flag : {"streaming", "stalled", "unplugged", "busy", "denied", "ended"}) {
     to.add(camera.state() == flag ? 1 : 0, {{"state", flag}});
   }

@@ -39,17 +39,17 @@ constexpr std::array<Fix, pipeline::kHealthCount> kFixes = {{
     {Health::light_mismatch,
      "The ring shows another light than at calibration: depth is scaled to it, with more noise; "
      "dtactctl led sets the light back."},
-    {Health::starting, "Starting up: keep the surface untouched until the state is serving."},
+    {Health::starting, "Starting up: keep the surface free until the state is serving."},
     {Health::light_unsettled,
-     "A light change is under way: keep the surface untouched until a new reference is taken."},
+     "A light change is under way: keep the surface free until a new reference is taken."},
     {Health::reference_stale,
-     "The reference belongs to another light: leave the surface untouched for a second or run "
+     "The reference belongs to another light: keep the surface free for a second or run "
      "dtactctl rezero."},
     {Health::reference_restored,
      "There was contact at start, so the last good reference is used: free the surface and run "
      "dtactctl rezero."},
     {Health::beyond_calibration,
-     "Pressed deeper than was calibrated: such pixels are marked untrusted; press less or "
+     "Pressed deeper than was calibrated: these pixels are marked untrusted; press less or "
      "calibrate with a deeper press."},
     {Health::image_repeated,
      "The camera repeats all or part of a picture: depth is old there; look at the USB cable, hub "
@@ -63,7 +63,7 @@ constexpr std::array<Fix, pipeline::kHealthCount> kFixes = {{
      "The light is not the reference's, or most of the surface is pressed, which looks alike: free "
      "the surface and run dtactctl rezero."},
     {Health::light_banded,
-     "Bands wander over the picture: make the exposure a whole number of the LEDs' PWM periods, or "
+     "Bands move over the picture: make the exposure a whole number of the LEDs' PWM periods, or "
      "the brightness full."},
     {Health::image_noisy,
      "Pixels are too noisy: raise the light and lower the camera's gain; many dead pixels look "

@@ -10,7 +10,7 @@ namespace dtact::net {
 /// its fix, the most urgent first. Empty when all is well.
 [[nodiscard]] std::string advice(const pipeline::Status& status);
 
-/// As on the wire, and as clients show it: "camera_fault", "serving".
+/// The name on the wire, which clients show: "camera_fault", "serving".
 [[nodiscard]] std::string health_name(pipeline::Health health);
 [[nodiscard]] std::string state_name(pipeline::State state);
 

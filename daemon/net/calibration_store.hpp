@@ -124,7 +124,7 @@ class FolderCalibrationStore : public CalibrationStore {
   [[nodiscard]] static Stamp stamp_of(const std::filesystem::path& file);
   /// STATE/calibrations/NUMBER/NAME of an uploaded one, or the configured folder.
   [[nodiscard]] std::filesystem::path folder_of(std::uint64_t number) const;
-  /// As from load(), which takes tens of milliseconds; a copy when nothing has changed since.
+  /// The same as from load(), which takes tens of milliseconds; cached while nothing changes.
   [[nodiscard]] CalibrationSummary summary_of(std::uint64_t number,
                                               const std::filesystem::path& folder);
 

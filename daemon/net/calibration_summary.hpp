@@ -19,7 +19,7 @@ struct CalibrationSummary {
   std::string created;  ///< ISO 8601, or empty.
   int frame_width = 0;  ///< The camera image's, pixels.
   int frame_height = 0;
-  std::vector<int> sharpen_steps;  ///< As from recon::sharpening_steps().
+  std::vector<int> sharpen_steps;  ///< See recon::sharpening_steps().
   bool operator==(const CalibrationSummary&) const = default;
 };
 

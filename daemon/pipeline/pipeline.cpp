@@ -102,7 +102,7 @@ DepthFrame Pipeline::prototype(const calibration::Calibration* calibration) cons
     const recon::RectifyTable& table = calibration->model->rectify;
     map = std::max(map, pixels(table.width, table.height));
   }
-  // Sized, not only reserved: copies keep the size, and the pages are touched now.
+  // Sized, not only reserved: copies keep the size, and the pages are mapped now.
   frame.depth_um.resize(map);
   // Maps of up to this number of rows record their tiles here.
   constexpr int kMaxRows = 4096;

@@ -202,7 +202,7 @@ class Port {
   [[nodiscard]] virtual UseCalibration prepare(
       const std::shared_ptr<const calibration::Calibration>& calibration,
       const ReconstructionRules& rules) const = 0;
-  /// As prepare(), for the calibration in use, or null, with other rules: makes only the maps.
+  /// Like prepare(), for the calibration in use, or null, with other rules: makes only the maps.
   [[nodiscard]] virtual SetReconstruction prepare_maps(
       const std::shared_ptr<const calibration::Calibration>& in_use,
       const ReconstructionRules& rules) const = 0;

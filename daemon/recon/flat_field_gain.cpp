@@ -30,7 +30,7 @@ FlatFieldGain moved(FlatFieldGain gain, double x_mm, double y_mm) {
   gain.centre_x_mm -= x_mm;
   gain.centre_y_mm -= y_mm;
   const double here = gain.polynomial_at(x_mm, y_mm);
-  if (!(here > 0)) throw std::invalid_argument("gain: the map lies where it is not above zero");
+  if (!(here > 0)) throw std::invalid_argument("gain: it is not above zero at the map");
   if (gain.polynomial.size() == 5) {  // the slopes at the new centre
     const double xy = gain.polynomial[3];
     gain.polynomial[0] += 2 * gain.polynomial[2] * x_mm + xy * y_mm;

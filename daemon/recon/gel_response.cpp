@@ -95,7 +95,7 @@ CellMap::CellMap(int width, int height, double mm_per_px)
       mm_(static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_)),
       sums_(static_cast<std::size_t>(width)),
       untrusted_(static_cast<std::size_t>(width)) {
-  if (mm_.empty()) throw std::invalid_argument("the depth map is too small to tell force");
+  if (mm_.empty()) throw std::invalid_argument("the depth map is too small to measure force");
 }
 
 void CellMap::read(std::span<const std::int16_t> depth_um) {

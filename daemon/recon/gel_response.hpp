@@ -49,7 +49,7 @@ class CellMap {
 /// By reciprocity the pressure p that makes u, zero outside a region, has the force
 /// ∫ p dA = ∫ q u dA, where q is the pressure that indents the whole region by 1. The region may be
 /// wider than the contact: all points pressed deeper than 0.04 mm. Scattering blurs the indentation
-/// in depth maps; a Gaussian of 0.2 h blurs the C(k) that q is solved with likewise.
+/// in depth maps; so the C(k) for q is blurred with the same Gaussian of 0.2 h.
 class GelResponse {
  public:
   /// For maps of the same shape as `shape`. Takes a few milliseconds.

@@ -54,7 +54,7 @@ void check(const Model& model) {
   if (model.scattering) check(*model.scattering);
   int before = 0;
   for (const Model::Sharpened& sharpened : model.sharpened) {
-    require(model.method == Method::lut, "sharpened: the published method has no such LUTs");
+    require(model.method == Method::lut, "sharpened: the published method has no sharpened LUTs");
     require(model.scattering.has_value(),
             "sharpened: its LUTs need the scattering that their levels were sharpened by");
     require(sharpened.steps >= 1 && sharpened.steps <= kMaxSharpeningSteps,

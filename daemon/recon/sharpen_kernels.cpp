@@ -46,7 +46,7 @@ void sharpen_row(const std::int16_t* level, const std::int16_t* before, const st
                  std::int16_t* after) noexcept {
   const auto down = [&wide](int k) { return between(wide.near[k], wide.other[k], wide.other_q15); };
   for (int x = 0; x < width; ++x) {
-    // Pixels lie at 1/8, 3/8, 5/8 and 7/8 of a coarse one, whose value is that of its middle.
+    // Pixels are at 1/8, 3/8, 5/8 and 7/8 of a coarse one, whose value is that of its middle.
     const int k = x / kCoarse;
     const int in = x % kCoarse;
     const std::int32_t share = in == 0 || in == kCoarse - 1 ? 3 * kEighth : kEighth;

@@ -38,7 +38,7 @@ class Journal:
         self.entries = []
 
     def until(self, wanted):
-        """The first entry, of all there were and will be, that `wanted` says yes to."""
+        """The first entry, past or future, for which `wanted` returns true."""
         for entry in self.entries:
             if wanted(entry):
                 return entry
@@ -62,7 +62,7 @@ def test(daemon, ctl, folder):
     manager.bind(str(folder / "notify"))
     log = folder / "stderr"
     config = folder / "dtactd.toml"
-    # A camera that is not there.
+    # The configured camera does not exist.
     config.write_text("camera.backend = 'v4l2'\ncamera.v4l2.device = 'serial:none'\nring.backend = 'null'\nstate_dir = 'state'\n"
                       "net.port = 0\nnet.name = 'left'\n")
     with open(log, "wb") as stderr:
@@ -79,19 +79,19 @@ def test(daemon, ctl, folder):
         while not manager.recv(4096).startswith(b"READY=1"):
             pass
 
-        # A condition, by its name.
-        trouble = journal.until(lambda entry: "DTACT_CONDITION" in entry)
-        expect(trouble, PRIORITY="4", DTACT_CONDITION="camera_fault", DTACT_SENSOR="left")
+        # The health flag, by its name.
+        trouble = journal.until(lambda entry: "DTACT_HEALTH" in entry)
+        expect(trouble, PRIORITY="4", DTACT_HEALTH="camera_fault", DTACT_SENSOR="left")
         assert trouble["MESSAGE"].startswith("camera_fault: The camera gives no usable frames."), trouble
 
-        # A client, by its address.
+        # The client, by its address.
         subprocess.run([ctl, "--port", port, "status"], check=True, stdout=subprocess.DEVNULL)
         left = journal.until(lambda entry: "disconnected" in entry["MESSAGE"])
         expect(left, PRIORITY="6", DTACT_SENSOR="left")
         assert left["DTACT_CLIENT"].startswith("127.0.0.1:"), left
         assert f"client {left['DTACT_CLIENT']} " in left["MESSAGE"], left
 
-        # A mistake, twenty times the same: once, and a count before the next line, which may be one
+        # The same mistake twenty times is logged once, with a count before the next line, which may be one
         # about the camera in between.
         config.write_text("camera.width = 1\n")
         for _ in range(20):
@@ -111,7 +111,7 @@ def test(daemon, ctl, folder):
     assert written + skipped == 20 and written < 10, lines
     assert not log.read_bytes(), log.read_text()
 
-    # What a process ends with, on the stream that is known as the unit's.
+    # The last words of a process, on the stream that is known as the unit's.
     with open(log, "wb") as stderr:
         check = subprocess.run([daemon, "--config", config, "--check-config"], stderr=stderr, check=False,
                                env={**os.environ, "JOURNAL_STREAM": f"{about.st_dev}:{about.st_ino}"})

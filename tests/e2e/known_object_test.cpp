@@ -1,5 +1,5 @@
-// `dtact-perceive serve --object` beside a daemon on the simulated sensor, against what was pressed
-// in.
+// `dtact-perceive serve --object` beside a daemon on the simulated sensor, compared with the
+// pressed object.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <signal.h>
@@ -65,7 +65,7 @@ class PerceiveProgram {
   std::uint16_t port_ = 0;
 };
 
-/// A ball about its file's origin, millimetres, as an STL file's text: its facets lie within 5 µm
+/// A ball about its file's origin, millimetres, as an STL file's text: its facets are within 5 µm
 /// of it.
 std::string stl_of_a_ball(double radius) {
   constexpr int kRings = 48;
@@ -117,7 +117,7 @@ TEST(KnownObject, IsFoundAndFollowedByTheProgram) {
         const v1::ObjectPose& pose = frame->pose();
         EXPECT_EQ(pose.object(), "known_ball");
         const double t = press.time_s(frame->sequence());
-        // Pressed in, held and slid.
+        // The ball is pressed in, held and slid.
         if (t < 4.2 || t > 11.9 || pose.tracking() == v1::ObjectPose::SEARCHING) return false;
         if (pose.tracking() != v1::ObjectPose::TRACKED) {
           ++others;
@@ -164,7 +164,7 @@ TEST(KnownObject, IsDoubtedWhenItIsLarge) {
   const std::filesystem::path file = folder.path() / "large.stl";
   base::write_file_atomically(file, stl_of_a_ball(25));
   const PerceiveProgram perceive(sensor, {"--object", file.string(), "--object-unit", "mm"});
-  EXPECT_THAT(perceive.log(), testing::HasSubstr("give the part of it that touches"));
+  EXPECT_THAT(perceive.log(), testing::HasSubstr("give only the part in contact"));
 }
 
 }  // namespace

@@ -17,10 +17,10 @@ constexpr int kMaxSteps = 20;
 /// A step shorter than this is the last, metres.
 constexpr double kConverged = 2e-7;
 /// Eigenvalues of the normal equations are mean squares of the distances' change per unit of
-/// motion. Below kMinCore in the contact, a direction cannot be told from the error of the normals:
-/// 3°, whose square is 0.003, and kNoises times their variance. That scatters by √(2/n) of itself
-/// for n independent normals. Twice as much would leave out the rotation of two balls about the
-/// line between them, which blur makes less round, and loses sensor_b's lopsided ball.
+/// motion. Below kMinCore in the contact, a direction cannot be separated from the error of the
+/// normals: 3°, whose square is 0.003, and kNoises times their variance. That scatters by √(2/n) of
+/// itself for n independent normals. Twice as much would leave out the rotation of two balls about
+/// the line between them, which blur makes less round, and loses sensor_b's lopsided ball.
 constexpr double kMinCore = 0.003;
 constexpr double kNoises = 3;
 /// Times the number of independent places an eigenvalue below this is of an unobservable direction:

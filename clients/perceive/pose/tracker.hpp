@@ -50,7 +50,7 @@ class Tracker {
   struct Keyframe {
     std::vector<Surfel> surfels;  ///< In the coordinates of the first frame.
     Motion motion = Motion::Identity();
-    Matrix6 covariance;  ///< Of `motion`'s error.
+    Matrix6 covariance;  ///< Covariance of `motion`'s error.
     double deepest = 0;  ///< The contact's depth, metres.
     double area = 0;     ///< Square metres.
     Eigen::Vector3d centre;

@@ -25,7 +25,7 @@ struct Mount {
   Topics reported = {};  ///< The client knows these channels.
 };
 
-/// One client of the Foxglove protocol. On the thread that runs the gateway's `io`.
+/// One client of the Foxglove protocol. Runs on the gateway's `io` thread.
 ///
 /// Overflow. Of each channel the newest message waits, in place of one before it. Answers and
 /// notices are never dropped: a client with more than kMaxControl of them unread is disconnected.

@@ -12,8 +12,7 @@
 
 #include "proto/dtact.pb.h"
 
-// What a sensor has for Foxglove: the channels of our recordings, and those that are worth seeing
-// live.
+// A sensor's channels for Foxglove: those of recordings, and some more for live viewing.
 namespace dtact::web::foxglove {
 
 enum class Topic : std::uint8_t {

@@ -22,7 +22,7 @@ struct Calibrated {
   client::Options options;  ///< How its daemon is reached.
 };
 
-/// Who comes to /sensors/NAME/calibrate: one session of each sensor at a time. On the thread that
+/// Serves /sensors/NAME/calibrate: one session of each sensor at a time. On the thread that
 /// runs the gateway's `io`.
 class GuidedEndpoint {
  public:

@@ -35,7 +35,7 @@ class Relay : public std::enable_shared_from_this<Relay> {
   void refuse(const std::string& sentence);
   /// Ends it at once.
   void close() { over(); }
-  /// A message to the page (a GuidedLine as JSON). Of scenes that wait the newest is sent.
+  /// A message to the page (a GuidedLine as JSON). Only the newest waiting scene is sent.
   void send_text(std::string text);
   [[nodiscard]] boost::asio::any_io_executor executor() { return socket_->executor(); }
 

@@ -275,7 +275,7 @@ Findings check_pio(const Machine& machine, const hal::RingConfig& ring) {
            is_raspberry_pi_5(machine)
                ? "echo dtoverlay=ws2812-pio,gpio=18,num_leds=8 | sudo tee -a "
                  "/boot/firmware/config.txt && sudo reboot (any GPIO of the header)"
-               : "set ring.backend = \"ws2812_spi\": only a Raspberry Pi 5 has such a PIO"}};
+               : "set ring.backend = \"ws2812_spi\": only a Raspberry Pi 5 has this PIO"}};
 }
 
 Findings check_gpio(const Machine& machine, const hal::RingConfig& ring) {

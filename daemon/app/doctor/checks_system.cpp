@@ -36,7 +36,7 @@ Findings check_realtime(const Machine& machine) {
                         ""});
   }
   const rlim_t memory = machine.limit(RLIMIT_MEMLOCK);
-  // mlockall() counts the whole address space, touched or not: some hundreds of megabytes.
+  // mlockall() counts the whole address space, used or not: some hundreds of megabytes.
   constexpr rlim_t kEnough = 1U << 30U;
   if (memory < kEnough) {
     findings.push_back(

@@ -26,7 +26,7 @@ inline constexpr double kBendMm = 0.166;
 /// (tests/accuracy/whole).
 [[nodiscard]] double rim_factor(std::int64_t made, std::int64_t beyond) noexcept;
 
-/// Uncertainty of a LUT whose calibration, an old one, does not state it, micrometres. Such LUTs
+/// Uncertainty of a LUT whose calibration, an old one, does not state it, micrometres. These LUTs
 /// had this error under a ball of 5 mm after one press or thirty of a ball of 4 mm
 /// (tests/accuracy/table/table.md, against the true indentation, the mean over six lights: ours
 /// from one press 50, the published ones 98 and 118, treated as one method here).

@@ -34,7 +34,7 @@ CalibratedImage::CalibratedImage(std::shared_ptr<const calibration::Calibration>
   if (region.x1 - region.x0 < 8 || region.y1 - region.y0 < 8) {
     throw std::invalid_argument(
         fmt::format("calibration \"{}\" covers {}x{} pixels of the frame, too little to tell light "
-                    "from touch: calibrate with a crop of at least a quarter of each side",
+                    "from contact: calibrate with a crop of at least a quarter of each side",
                     calibration->name, table.width, table.height));
   }
   const std::vector<std::uint16_t>& reference_q8 = calibration->model->reference_q8;

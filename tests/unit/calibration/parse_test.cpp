@@ -41,7 +41,7 @@ TEST(ParseCalibration, TakesTheTwoFilesOfAnUpload) {
 }
 
 TEST(ParseCalibration, NamesFileLineAndKey) {
-  // mm_per_px stands on line 5.
+  // mm_per_px is on line 5.
   expect_refused(with("mm_per_px = 0.051", "mm_per_px = \"wide\""), "upload:5: mm_per_px",
                  "wrong type");
 }
@@ -128,7 +128,7 @@ TEST(ParseCalibration, ReadsBackTheLens) {
 TEST(ParseCalibration, WhatTheLensDoesNotSeeIsUntrustedBesideTheMask) {
   Calibration with_lens = sample();
   recon::Lens lens;
-  // Three pixels of the frame, 12×9, for each of the map: its rim lies outside.
+  // A pixel of the map is three of the frame, 12×9: the map's rim is outside.
   lens.homography = {60, 0, 5.5, 0, 60, 4, 0, 0, 1};
   lens.centre_col = 5.5;
   lens.centre_row = 4;
@@ -241,7 +241,7 @@ TEST(ParseCalibration, SharpenedLutsNeedTheirScattering) {
   const std::string without = toml.substr(0, from) + toml.substr(toml.find("# Indentation", from));
   expect_refused(without, "sharpened[0]", "[scattering]");
   expect_refused(with("method = \"lut\"", "method = \"published\""), "sharpened[0]",
-                 "\"published\" has no such LUTs");
+                 "\"published\" has no sharpened LUTs");
 }
 
 TEST(ParseCalibration, RefusesAnotherReference) {
@@ -252,7 +252,7 @@ TEST(ParseCalibration, RefusesAnotherReference) {
               ThrowsMessage<std::runtime_error>(HasSubstr("reference.sha256")));
 }
 
-/// The sample with `png` in the place of its reference and the checksum to match.
+/// The sample with `png` as its reference and the checksum to match.
 void expect_reference_refused(const std::string& png, const std::string& what) {
   const Files files = format(sample());
   std::string toml = files.toml;

@@ -87,7 +87,7 @@ TEST(Advice, SaysWhatToCheckInADarkPictureInsteadOfStartingUp) {
     EXPECT_THAT(advice(status),
                 StartsWith("The picture is too dark to measure in: check the ring's "
                            "power and wiring"));
-    EXPECT_THAT(advice(status), Not(HasSubstr("keep the surface untouched")));
+    EXPECT_THAT(advice(status), Not(HasSubstr("keep the surface free")));
   }
 }
 

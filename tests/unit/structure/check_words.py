@@ -10,7 +10,7 @@ TEXT = {".cpp", ".hpp", ".h", ".c", ".in", ".py", ".pyi", ".ts", ".mjs", ".css",
 NO_SUFFIX = {"dev"}
 IDENTIFIER = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 PART = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|[0-9]+")
-# What others wrote, a tool writes, or speaks of earlier versions.
+# Written by others or by a tool, or about earlier versions.
 LEFT_OUT = ("clients/web/page/package-lock.json", "clients/web/page/gen/", "debian/changelog", "debian/copyright",
             "CHANGELOG.md", "tests/unit/structure/words.txt", "tests/unit/structure/check_words_test.py")
 
@@ -35,7 +35,7 @@ class Rules:
                 pattern = re.compile(rf"(?<![\w-])(?:{fields[1]})(?![\w-])", re.I)
                 self.names += [(pattern, fields[2])] if kind != "text" else []
                 self.texts += [(pattern, fields[2])] if kind != "name" else []
-            elif kind != "later":
+            else:
                 raise ValueError(f"words.txt:{number}: not `kind, pattern, instead` with tabs between")
 
     def is_allowed(self, path, found):
@@ -43,12 +43,12 @@ class Rules:
 
 
 def complaints(path, text, rules):
-    """One line for each refused word: path, line number, what to write instead."""
+    """One line for each refused word: path, line number, and the word to use instead."""
     for pattern, instead in rules.names:
         found = pattern.search(" / ".join(words_of(part) for part in path.split("/")))
         if found and not rules.is_allowed(path, found.group()):
             yield f'{path}: the name has "{found.group()}": {instead}'
-    names = {}  # of the whole file, each looked at once
+    names = {}  # of the whole file, each checked once
     for name in set(IDENTIFIER.findall(text)):
         if "_" in name.strip("_") or re.search(r"[a-z][A-Z]", name):
             words = words_of(name)

@@ -99,10 +99,10 @@ class Frame:
     @property
     def _depth(self) -> Message:
         if not self.has_depth:
-            conditions = ", ".join(self.health)
+            flags = ", ".join(self.health)
             raise NotInFrame(
                 f"frame {self.sequence} has no depth map"
-                + (f" ({conditions})" if conditions else "")
+                + (f" ({flags})" if flags else "")
                 + ": either none was subscribed, or status() says what is missing"
             )
         return self.message.depth

@@ -21,7 +21,7 @@ import type { Tool, View } from "./view/stage";
 import { fixed } from "./labels";
 
 /** Update interval of numbers that change with every frame: faster is unreadable. */
-const TELL_MS = 100;
+const REPORT_MS = 100;
 
 const KEYS_OF_POINTS = [" ", "ArrowLeft", "ArrowRight"];
 
@@ -267,7 +267,7 @@ export class Pane {
         ended: "ended",
       }[link.state],
     );
-    this.tellNotice(link.state === "live" && link.sentence === "Connected." ? "" : link.sentence);
+    this.showNotice(link.state === "live" && link.sentence === "Connected." ? "" : link.sentence);
     this.recording.allow(link.state === "live");
     this.tokenForm.hidden = link.state !== "token";
     // A paused view goes on showing its frame.
@@ -278,7 +278,7 @@ export class Pane {
     }
   }
 
-  private tellNotice(sentence: string): void {
+  private showNotice(sentence: string): void {
     say(this.notice, sentence);
     this.notice.hidden = sentence === "";
   }
@@ -328,13 +328,13 @@ export class Pane {
     if (!this.paused) this.reconstruction.frame(frame);
     if (!this.paused) this.plots.add(frame, this.meter.latencyMs);
     const now = performance.now();
-    if (now - this.reportedAt < TELL_MS && !this.paused) return true;
+    if (now - this.reportedAt < REPORT_MS && !this.paused) return true;
     this.reportedAt = now;
     this.contact.show(frame);
     if (frame.contact?.inContact === false) this.light.noContact();
     this.quality.show(frame);
     this.element.dataset["sequence"] = String(frame.sequence);
-    this.tellRate(frame);
+    this.showRate(frame);
     return true;
   }
 
@@ -363,7 +363,7 @@ export class Pane {
     return this.isUncalibrated(frame) && this.sensor.mayControl;
   }
 
-  private tellRate(frame: Frame): void {
+  private showRate(frame: Frame): void {
     if (this.paused) {
       say(
         this.behind,

@@ -45,7 +45,7 @@ export class RecordButton {
     this.sensor.record(begins);
   }
 
-  /** Ends what is recorded; done when that is handed over. */
+  /** Ends the recording; done when its file is saved. */
   async close(): Promise<void> {
     const over = new Promise<void>((done) => (this.ended = done));
     if (this.state === "recording") this.toggle();

@@ -30,7 +30,7 @@ export class QualityPanel {
     camera: { label: "Camera" },
     calibration: { label: "Calibration" },
   });
-  private readonly healthFlags = el("ul", { class: "conditions" });
+  private readonly healthFlags = el("ul", { class: "health" });
   private readonly advice = el("p", { class: "advice", role: "status" });
   readonly element = panel("Quality", this.healthFlags, this.advice, this.facts.element);
   private reference: { sequence: number; restored: boolean } | undefined;
@@ -94,10 +94,10 @@ export class QualityPanel {
       const reported = trouble
         .filter(([count]) => count > 0n)
         .map(([count, name]) => `, ${count} ${name}`);
-      const condition = camera.state === "streaming" ? "" : `${camera.state}, `;
+      const state = camera.state === "streaming" ? "" : `${camera.state}, `;
       this.facts.set(
         "camera",
-        `${condition}${fixed(status.fps, 1)} of ${fixed(camera.fps, 0)} fps${reported.join("")}`,
+        `${state}${fixed(status.fps, 1)} of ${fixed(camera.fps, 0)} fps${reported.join("")}`,
       );
     }
     const made = status.calibration;

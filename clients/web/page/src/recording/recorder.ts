@@ -8,7 +8,7 @@ import { Recording } from "./recording";
 
 /** A browser that is to keep more may keep nothing. */
 const MAX_BYTES = 2 ** 30;
-const TELL_MS = 250;
+const REPORT_MS = 250;
 
 /** How far a recording is; with its file once it is over. */
 export interface Recorded {
@@ -56,7 +56,7 @@ export class Recorder {
       void this.finish(
         "1 GB is recorded, which is all that a browser is asked to keep; dtactctl record has no limit.",
       );
-    } else if (now - this.reportedAt > TELL_MS) {
+    } else if (now - this.reportedAt > REPORT_MS) {
       this.reportedAt = now;
       this.source.tell(this.state());
     }

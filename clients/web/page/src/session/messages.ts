@@ -47,7 +47,7 @@ export interface Cloud {
   width: number;
   height: number;
   mmPerUnit: number;
-  /** That are there. */
+  /** Number of points. */
   points: number;
 }
 
@@ -64,7 +64,7 @@ export interface Frame {
   calibration: number | undefined;
   depth: DepthMap | undefined;
   luma: LumaMap | undefined;
-  /** Of dtact-perceive alone, as is the cloud. */
+  /** Only dtact-perceive sends pose and cloud. */
   pose: ObjectPose | undefined;
   cloud: Cloud | undefined;
   /** What making the depth took, milliseconds, and at which share of the resolution: 1, 2 or 4. */

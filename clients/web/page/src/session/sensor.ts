@@ -71,7 +71,7 @@ export class Sensor {
     return url.href;
   }
 
-  /** That of a guided calibration. */
+  /** Address of the guided calibration. */
   get calibrateAddress(): string {
     const token = this.token && `?token=${encodeURIComponent(this.token)}`;
     return this.address("calibrate") + token;

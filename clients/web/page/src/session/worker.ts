@@ -48,7 +48,7 @@ class Session {
     this.wants = open.wants;
     this.nearby = open.nearby;
     this.connection = new Connection(open.url, open.program, open.token, {
-      link: (link) => this.tellLink(link),
+      link: (link) => this.showLink(link),
       hello: (hello) => this.greet(hello),
       reply: (id, reply) => {
         if (!this.answered(id, reply)) post({ kind: "reply", id, reply });
@@ -99,7 +99,7 @@ class Session {
     }
   }
 
-  private tellLink(link: Link): void {
+  private showLink(link: Link): void {
     if (link.state !== "live") this.stopRecording(LOST);
     post({ kind: "link", link });
   }

@@ -161,14 +161,14 @@ export class Stage {
     this.shape();
     this.drawOver();
     this.drawBar();
-    this.tellValue();
-    this.tellProfile();
+    this.showValue();
+    this.showProfile();
   }
 
   use(tool: Tool): void {
     this.tool = tool;
     if (tool === "point") this.line = undefined;
-    this.tellProfile();
+    this.showProfile();
     this.drawOver();
   }
 
@@ -198,8 +198,8 @@ export class Stage {
     if (this.view === "camera" && frame.luma) this.map.drawLuma(frame.luma);
     this.shape();
     this.drawOver();
-    this.tellValue();
-    if (this.line) this.tellProfile();
+    this.showValue();
+    if (this.line) this.showProfile();
   }
 
   /**
@@ -343,13 +343,13 @@ export class Stage {
     this.cursor = place;
     if (this.drawing && this.line && place) {
       this.line = { from: this.line.from, to: place };
-      this.tellProfile();
+      this.showProfile();
     }
     this.drawOver();
-    this.tellValue();
+    this.showValue();
   }
 
-  private tellValue(): void {
+  private showValue(): void {
     const map = this.shown();
     const pixel = map && this.cursor && pixelOf(this.grid(map), this.cursor);
     if (!map || !pixel || !this.cursor) {
@@ -376,7 +376,7 @@ export class Stage {
     }
   }
 
-  private tellProfile(): void {
+  private showProfile(): void {
     const { depth, line } = this;
     this.profiled(depth && line && this.view === "depth" ? profileOf(depth, line) : undefined);
   }

@@ -6,14 +6,14 @@ import { unzstd } from "./zstd";
 export const DEPTH_INT16 = 1;
 export const DEPTH_PREDICT_ZSTD = 2;
 
-/** So many values fit a message; a decoder allocates for no more. */
+/** Largest number of values in a message; a decoder allocates for no more. */
 export const MAX_VALUES = 8_388_608;
 
 function decodeInt16(data: Uint8Array, out: Int16Array): void {
   if (data.length !== 2 * out.length) {
     throw new Error(`${data.length} bytes of depth where ${2 * out.length} are due`);
   }
-  // As it stands: every machine with a browser is little-endian.
+  // Copied without swapping: every machine with a browser is little-endian.
   new Uint8Array(out.buffer, out.byteOffset, out.byteLength).set(data);
 }
 
