@@ -16,7 +16,12 @@ bool is_space(char c) {
   return c == ' ' || c == '\t' || c == '\n' || c == '\r' || c == '\v' || c == '\f';
 }
 
-/// A word of a file for a message, which travels as UTF-8.
+bool is_finite(const std::array<double, 3>& vector) {
+  return std::ranges::all_of(vector, [](double part) { return std::isfinite(part); });
+}
+
+}  // namespace
+
 std::string shown(std::string_view word) {
   std::string text(word.substr(0, 40));
   for (char& c : text) {
@@ -24,12 +29,6 @@ std::string shown(std::string_view word) {
   }
   return text;
 }
-
-bool is_finite(const std::array<double, 3>& vector) {
-  return std::ranges::all_of(vector, [](double part) { return std::isfinite(part); });
-}
-
-}  // namespace
 
 void MeshReader::fail(const std::string& sentence) const {
   throw std::runtime_error(binary_ ? fmt::format("{}, byte {}: {}", name_, at_, sentence)
@@ -83,6 +82,16 @@ void MeshReader::expect(std::string_view expected) {
            ? fmt::format("the file ends where \"{}\" is expected: it is cut off, write it again",
                          expected)
            : fmt::format("expected \"{}\", not \"{}\"", expected, shown(found)));
+}
+
+void MeshReader::expect_end(const std::string& last) {
+  if (binary_ ? left() == 0 : word().empty()) return;
+  fail(binary_ ? fmt::format("{} byte(s) are left after {}: the header's counts are wrong, or they "
+                             "are to be taken off",
+                             left(), last)
+               : fmt::format("more follows after {}: the header's counts are wrong, or it is to be "
+                             "taken off",
+                             last));
 }
 
 void MeshReader::skip(std::size_t count) { (void)take(count); }

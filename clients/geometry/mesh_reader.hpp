@@ -12,6 +12,9 @@
 
 namespace dtact::perceive {
 
+/// A word of a file for a message, which travels as UTF-8.
+[[nodiscard]] std::string shown(std::string_view word);
+
 /// The bytes of a shape's file, taken one after another. Everything throws std::runtime_error
 /// naming file and place where they end too early or are not what is asked for.
 class MeshReader {
@@ -30,6 +33,8 @@ class MeshReader {
   [[nodiscard]] std::string_view line();
   [[nodiscard]] double number();
   void expect(std::string_view word);
+  /// Fails unless the file ends here, but for blanks of text. `last`: what was read last.
+  void expect_end(const std::string& last);
 
   /// Binary data.
   void skip(std::size_t count);

@@ -233,6 +233,7 @@ Mesh parse_ply(std::string_view bytes, const std::string& name) {
   Mesh mesh;
   Body body(reader, header.format);
   for (const Element& element : header.elements) body.read(element, mesh);
+  reader.expect_end("the last element");
   return mesh;
 }
 

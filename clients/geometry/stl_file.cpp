@@ -22,13 +22,15 @@ void check_count(std::size_t triangles, const MeshReader& reader) {
   reader.fail(fmt::format("more than {} triangles: simplify the mesh", kMaxMeshParts));
 }
 
-Mesh parse_text(MeshReader& reader) {
-  Mesh mesh;
-  (void)reader.line();  // solid and a name
+/// The facets of one solid, after its first line up to its last.
+void read_solid(MeshReader& reader, Mesh& mesh) {
   std::array<std::array<double, 3>, 3> corners{};
   for (;;) {
     const std::string_view word = reader.word();
-    if (word == "endsolid") return mesh;
+    if (word == "endsolid") {
+      (void)reader.line();
+      return;
+    }
     if (word != "facet") {
       reader.fail("expected \"facet\" or \"endsolid\": not an STL file, or it is cut off");
     }
@@ -45,6 +47,21 @@ Mesh parse_text(MeshReader& reader) {
     reader.expect("endfacet");
     add_triangle(corners, mesh);
   }
+}
+
+/// One solid or several, which together are the shape.
+Mesh parse_text(MeshReader& reader) {
+  Mesh mesh;
+  for (std::string_view word = reader.word(); !word.empty(); word = reader.word()) {
+    if (word != "solid") {
+      reader.fail(
+          fmt::format("after \"endsolid\" expected another \"solid\" or the file's end, not \"{}\"",
+                      shown(word)));
+    }
+    (void)reader.line();  // its name
+    read_solid(reader, mesh);
+  }
+  return mesh;
 }
 
 Mesh parse_binary(MeshReader& reader, std::size_t triangles) {
@@ -76,10 +93,15 @@ Mesh parse_stl(std::string_view bytes, const std::string& name) {
     const std::size_t triangles = binary.binary<std::uint32_t>(false);
     const std::size_t expected = kHeader + sizeof(std::uint32_t) + kTriangle * triangles;
     if (bytes.size() == expected) return parse_binary(binary, triangles);
-    if (!bytes.starts_with("solid")) {
-      binary.fail(
-          fmt::format("neither PLY nor STL, or cut off: {} triangles take {} bytes, there are {}",
-                      triangles, expected, bytes.size()));
+    // Text has no NUL, which ends the count of fewer than 16 million triangles.
+    const bool text = bytes.starts_with("solid") && bytes[kHeader + 3] != '\0';
+    if (!text) {
+      binary.fail(fmt::format(
+          "neither PLY nor STL, or {}: {} triangles take {} bytes, there are {}",
+          bytes.size() < expected ? "cut off"
+                                  : fmt::format("followed by {} byte(s) too many, to be taken off",
+                                                bytes.size() - expected),
+          triangles, expected, bytes.size()));
     }
   } else if (!bytes.starts_with("solid")) {
     reader.fail(

@@ -72,6 +72,41 @@ TEST(MeshFile, FurtherPropertiesAndElementsArePassedOver) {
   EXPECT_DOUBLE_EQ(volume_of(parse_mesh(text, "object")), 64);
 }
 
+/// Three different boxes' worth of triangles would hide which solid was left out: each corner
+/// tells.
+TEST(MeshFile, AllSolidsOfATextStlAreRead) {
+  const auto solid = [](const std::string& name, const std::string& corner) {
+    return "solid " + name + "\n facet normal 0 0 1\n  outer loop\n   vertex 0 0 0\n   vertex " +
+           corner + "\n   vertex 0 7 0\n  endloop\n endfacet\nendsolid " + name + "\n";
+  };
+  const Mesh mesh =
+      parse_mesh(solid("a part", "1 0 0") + "\n" + solid("", "2 0 0") + solid("b", "3 0 0"), "x");
+  ASSERT_EQ(mesh.triangles.size(), 3U);
+  EXPECT_EQ(mesh.points.at(1)[0], 1);
+  EXPECT_EQ(mesh.points.at(4)[0], 2);
+  EXPECT_EQ(mesh.points.at(7)[0], 3);
+  EXPECT_THAT(error_of(solid("a", "1 0 0") + solid("b", "2 0 0").substr(0, 40)),
+              HasSubstr("object, line 12: "));
+  EXPECT_THAT(error_of(solid("a", "1 0 0") + "facet"),
+              HasSubstr("line 10: after \"endsolid\" expected another \"solid\" or the file's end, "
+                        "not \"facet\""));
+}
+
+TEST(MeshFile, WhatFollowsTheLastPartIsReported) {
+  const std::string binary = seed("binary.stl");
+  EXPECT_THAT(error_of(binary + "x"), HasSubstr("followed by 1 byte(s) too many"));
+  EXPECT_THAT(error_of(binary + "x"), testing::Not(HasSubstr("cut off")));
+  std::string named = binary;
+  named.replace(0, 9, "solid box");
+  EXPECT_THAT(error_of(named + "xyz"), HasSubstr("followed by 3 byte(s) too many"));
+  EXPECT_THAT(error_of(named.substr(0, 600)), HasSubstr("cut off"));
+  EXPECT_THAT(error_of(seed("little.ply") + "ab"),
+              HasSubstr("2 byte(s) are left after the last element"));
+  EXPECT_EQ(error_of(seed("ascii.ply") + " \n\n"), "none");
+  EXPECT_THAT(error_of(with(seed("ascii.ply"), "element face 6", "element face 5")),
+              HasSubstr("more follows after the last element"));
+}
+
 TEST(MeshFile, BrokenFilesAreReportedByPlaceAndFix) {
   const std::string stl = seed("ascii.stl");
   const std::string ply = seed("ascii.ply");
