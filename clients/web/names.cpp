@@ -16,7 +16,8 @@ bool iequals(std::string_view a, std::string_view b) {
       a, b, [](unsigned char x, unsigned char y) { return std::tolower(x) == std::tolower(y); });
 }
 
-/// "[::1]:7380" → "::1", "gripper:7380" → "gripper".
+}  // namespace
+
 std::string_view without_port(std::string_view host) {
   if (host.starts_with('[')) {
     const auto end = host.find(']');
@@ -25,14 +26,14 @@ std::string_view without_port(std::string_view host) {
   return host.substr(0, host.find(':'));
 }
 
-}  // namespace
-
 bool is_own_host(std::string_view host, const std::vector<std::string>& names) {
   const std::string_view name = without_port(host);
   boost::system::error_code error;
   (void)boost::asio::ip::make_address(std::string(name), error);
   if (!error || iequals(name, "localhost")) return true;
-  return std::ranges::any_of(names, [&](const std::string& own) { return iequals(name, own); });
+  return !name.empty() && std::ranges::any_of(names, [&](const std::string& own) {
+    return iequals(name, without_port(own));
+  });
 }
 
 bool is_own_origin(std::string_view origin, std::string_view host, bool tls,

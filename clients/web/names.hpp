@@ -6,10 +6,13 @@
 
 namespace dtact::web {
 
+/// "[::1]:7380" → "::1", "gripper:7380" → "gripper".
+[[nodiscard]] std::string_view without_port(std::string_view host);
+
 /// Whether a request that names `host` (the Host field, with or without a port) is meant for this
-/// gateway: an IP address, localhost, or one of `names`. What else leads here does so by a name
-/// server that an unauthenticated client's page has arranged (DNS rebinding): to a browser the
-/// gateway would then be of that page's own origin.
+/// gateway: an IP address, localhost, or one of `names`, whatever their ports. What else leads here
+/// does so by a name server that an unauthenticated client's page has arranged (DNS rebinding): to
+/// a browser the gateway would then be of that page's own origin.
 [[nodiscard]] bool is_own_host(std::string_view host, const std::vector<std::string>& names);
 
 /// Whether a page of `origin` may open a WebSocket here: one that came from here by the same name,

@@ -31,11 +31,12 @@ std::string_view path_of(const Request& request) {
 }
 
 Answer misdirected(const Request& request) {
+  const std::string_view name = without_port(field(request, http::field::host));
   return refusal(
       http::status::misdirected_request,
       fmt::format("this gateway does not know itself by the name \"{}\": use its address or "
                   "localhost, or start it with --name {}",
-                  field(request, http::field::host), field(request, http::field::host)));
+                  name, name));
 }
 
 }  // namespace

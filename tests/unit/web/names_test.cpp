@@ -13,6 +13,14 @@ TEST(Hosts, AddressesLocalhostAndOwnNames) {
   }
 }
 
+TEST(Hosts, AnOwnNameMayBeGivenWithAPort) {
+  EXPECT_EQ(without_port("gripper:7380"), "gripper");
+  EXPECT_EQ(without_port("[fe80::1]:7380"), "fe80::1");
+  EXPECT_TRUE(is_own_host("gripper:7380", {"gripper:7380"}));
+  EXPECT_TRUE(is_own_host("gripper", {"gripper:7380"}));
+  EXPECT_FALSE(is_own_host(":7380", {":7380"}));
+}
+
 TEST(Hosts, NamesThatOthersChoose) {
   for (const char* host : {"", ":7380", "evil.example", "127.0.0.1.evil.example", "localhost.",
                            "localhost.evil.example", "gripper.evil.example", "[::1", "gripper2"}) {
