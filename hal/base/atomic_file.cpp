@@ -72,6 +72,12 @@ std::string read_file(const std::filesystem::path& path, std::size_t limit) {
   }
 }
 
+std::string read_text_file(const std::filesystem::path& path, std::size_t limit) {
+  std::string content = read_file(path, limit);
+  if (content.starts_with("\xEF\xBB\xBF")) content.erase(0, 3);
+  return content;
+}
+
 namespace {
 
 namespace fs = std::filesystem;

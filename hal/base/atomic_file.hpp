@@ -19,6 +19,10 @@ void write_file_atomically(const std::filesystem::path& path, std::string_view c
 [[nodiscard]] std::string read_file(const std::filesystem::path& path,
                                     std::size_t limit = 64U << 20U);
 
+/// The same without the byte order mark that some programs put before text (UTF-8's EF BB BF).
+[[nodiscard]] std::string read_text_file(const std::filesystem::path& path,
+                                         std::size_t limit = 64U << 20U);
+
 /// Makes a rename in `folder` last through a power cut. Throws std::system_error.
 void sync_folder(const std::filesystem::path& folder);
 

@@ -84,7 +84,7 @@ void add_png(Recording& recording, const fs::path& file) {
 
 std::map<std::string, std::int64_t> read_timestamps(const fs::path& file) {
   std::map<std::string, std::int64_t> times;
-  std::istringstream text(base::read_file(file));
+  std::istringstream text(base::read_text_file(file));
   std::string line;
   for (int number = 1; std::getline(text, line); ++number) {
     if (!line.empty() && line.back() == '\r') line.pop_back();

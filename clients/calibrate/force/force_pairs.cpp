@@ -130,7 +130,7 @@ Reading parse_reading(const std::string& text) {
 }
 
 std::vector<Reading> read_readings(const fs::path& csv) {
-  std::istringstream lines(base::read_file(csv));
+  std::istringstream lines(base::read_text_file(csv));
   std::vector<Reading> readings;
   std::string line;
   bool headed = false;
@@ -220,6 +220,9 @@ Pair ContactReader::measure_recording(const std::string& path, std::uint64_t fir
     return at < end;
   };
   recording::read_recording(file, handlers);
+  if (const std::string damage = file.damage(); !damage.empty()) {
+    fmt::print(stderr, "{}: not all of it could be read ({}): the rest is used\n", path, damage);
+  }
   if (map.data().empty()) {
     throw std::runtime_error(fmt::format(
         "{}: there is no contact in its frames, or they have no depth: take the pair out, or "

@@ -61,6 +61,16 @@ TEST_F(AtomicFile, ReadNamesTheMissingFile) {
   }
 }
 
+TEST_F(AtomicFile, TextIsReadWithoutItsByteOrderMark) {
+  write_file_atomically(folder_ / "a",
+                        "\xEF\xBB\xBF"
+                        "frames,force\n");
+  EXPECT_EQ(read_text_file(folder_ / "a"), "frames,force\n");
+  EXPECT_EQ(read_file(folder_ / "a").size(), 16U);
+  write_file_atomically(folder_ / "a", "b\xEF\xBB\xBF");
+  EXPECT_EQ(read_text_file(folder_ / "a"), "b\xEF\xBB\xBF");
+}
+
 TEST_F(AtomicFile, ReadRefusesMoreThanTheLimit) {
   write_file_atomically(folder_ / "a", "12345");
   EXPECT_EQ(read_file(folder_ / "a", 5), "12345");

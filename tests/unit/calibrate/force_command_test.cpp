@@ -214,6 +214,12 @@ TEST_F(Force, ReadsItsInputStrictly) {
   base::write_file_atomically(at("b.csv"), "frames,force\n\npress.png,heavy\n");
   EXPECT_THAT([&] { (void)read_readings(at("b.csv")); },
               ThrowsMessage<std::runtime_error>(HasSubstr("b.csv:3")));
+  // A spreadsheet's UTF-8 begins with a byte order mark.
+  base::write_file_atomically(at("c.csv"),
+                              "\xEF\xBB\xBF"
+                              "frames,force\r\npress.png,23\r\n");
+  ASSERT_EQ(read_readings(at("c.csv")).size(), 1U);
+  EXPECT_EQ(read_readings(at("c.csv")).front().value, 23);
 }
 
 }  // namespace
