@@ -7,6 +7,7 @@
 #include <cmath>
 #include <functional>
 #include <iterator>
+#include <numeric>
 #include <opencv2/imgproc.hpp>
 #include <stdexcept>
 #include <utility>
@@ -33,14 +34,27 @@ double noise_of(const cv::Mat1f& image) {
   return 1.4826 * *middle / 6;
 }
 
-/// Darkening in grey levels of the mean light, as if the light were even.
-cv::Mat1f relative_darkening(const cv::Mat1f& reference, const cv::Mat1f& frame) {
+/// What the pins are looked for in.
+struct Darkening {
+  cv::Mat1f levels;  ///< Grey levels of the mean light, as if the light were even.
+  cv::Mat1f noise;   ///< Standard deviation of each pixel's level: large where the light is weak.
+};
+
+Darkening relative_darkening(const cv::Mat1f& reference, const cv::Mat1f& frame) {
   constexpr double kSmooth = 3;      // pixels: the light is smooth, the camera's noise is not
   constexpr double kDarkest = 0.05;  // of the mean; darker parts are ignored
   cv::Mat1f light;
   cv::GaussianBlur(reference, light, {}, kSmooth, kSmooth, cv::BORDER_REPLICATE);
   const double mean = cv::mean(light)[0];
-  return cv::Mat1f((reference - frame).mul(mean / cv::max(light, kDarkest * mean)));
+  const cv::Mat1f gain(mean / cv::max(light, kDarkest * mean));
+  const cv::Mat1f loss(reference - frame);
+  return {cv::Mat1f(loss.mul(gain)), cv::Mat1f(noise_of(loss) * gain)};
+}
+
+/// At the pixel nearest to a place, or at the frame's edge nearest to it.
+float at_nearest(const cv::Mat1f& image, Point px) {
+  return image(std::clamp(static_cast<int>(std::lround(px.y)), 0, image.rows - 1),
+               std::clamp(static_cast<int>(std::lround(px.x)), 0, image.cols - 1));
 }
 
 Point place_mm(const Board& board, const Lattice& lattice, int row, int col) {
@@ -65,7 +79,8 @@ struct Settled {
   const Lattice* lattice = nullptr;
   std::vector<Mark> marks;
   std::vector<std::string> missing;
-  double rms_mm = 0;  ///< Residual of the marks for a lens of 12 parameters.
+  Lens lens;          ///< Of 12 parameters, through the marks.
+  double rms_mm = 0;  ///< Their residual for it.
 };
 
 /// The median of the heights around a place of the lattice.
@@ -82,6 +97,11 @@ double neighbours_height(const std::vector<double>& heights, const Lattice& latt
   }
   std::ranges::sort(around);
   return around[around.size() / 2];
+}
+
+/// Row or column of a mark by its millimetres.
+int index_of(double mm, int count, const Board& board) {
+  return static_cast<int>(std::lround(mm / board.pitch_mm + 0.5 * (count - 1)));
 }
 
 std::string name_of(int row, int col) { return fmt::format("row {}, column {}", row + 1, col + 1); }
@@ -103,11 +123,8 @@ bool drop_strays(Settled& settled, const Lens& lens, const Board& board) {
     if (distances[i] <= limit) {
       kept.push_back(mark);
     } else {
-      const auto index = [&](double mm, int count) {
-        return static_cast<int>(std::lround(mm / board.pitch_mm + 0.5 * (count - 1)));
-      };
-      settled.missing.push_back(name_of(index(mark.mm.y, settled.lattice->rows),
-                                        index(mark.mm.x, settled.lattice->cols)));
+      settled.missing.push_back(name_of(index_of(mark.mm.y, settled.lattice->rows, board),
+                                        index_of(mark.mm.x, settled.lattice->cols, board)));
     }
   }
   const bool any = kept.size() < settled.marks.size();
@@ -115,12 +132,18 @@ bool drop_strays(Settled& settled, const Lens& lens, const Board& board) {
   return any;
 }
 
-Settled settle(const cv::Mat1f& image, double noise, const Lattice& lattice, const Board& board) {
-  constexpr double kSure = 5;          // standard deviations of the noise
-  constexpr double kWithin = 0.25;     // of the pitch
-  constexpr double kNeighbours = 0.2;  // of the neighbours' height
+constexpr double kSure = 5;          // standard deviations of the noise
+constexpr double kWithin = 0.25;     // of the pitch
+constexpr double kNeighbours = 0.2;  // of the neighbours' height
+
+/// Height that noise alone makes at a place.
+double height_noise(const Darkening& image, const PinFit& fit, const Lens& lens, Point mm) {
+  return fit.height_noise(at_nearest(image.noise, project(lens, mm)));
+}
+
+Settled settle(const Darkening& image, const Lattice& lattice, const Board& board) {
   constexpr int kRounds = 3;
-  Settled settled{&lattice, {}, {}, 0};
+  Settled settled{&lattice, {}, {}, {}, 0};
   int i = 0;
   for (const auto& place : lattice.places) {
     if (place) {
@@ -131,7 +154,7 @@ Settled settle(const cv::Mat1f& image, double noise, const Lattice& lattice, con
   }
   Lens lens = fit_lens(settled.marks, searching_model(settled.marks.size()));
   for (int round = 0; round < kRounds; ++round) {
-    const PinFit fit(image, board.pitch_mm, recon::central_mm_per_px(lens));
+    const PinFit fit(image.levels, board.pitch_mm, recon::central_mm_per_px(lens));
     std::vector<Point> places;
     std::vector<double> heights;
     for (int pin = 0; pin < lattice.rows * lattice.cols; ++pin) {
@@ -147,7 +170,7 @@ Settled settle(const cv::Mat1f& image, double noise, const Lattice& lattice, con
       const int row = pin / lattice.cols;
       const int col = pin % lattice.cols;
       const double height = heights[static_cast<std::size_t>(pin)];
-      if (height > kSure * fit.height_noise(noise) &&
+      if (height > kSure * height_noise(image, fit, lens, place_mm(board, lattice, row, col)) &&
           height > kNeighbours * neighbours_height(heights, lattice, row, col)) {
         settled.marks.push_back({place_mm(board, lattice, row, col),
                                  project(lens, places[static_cast<std::size_t>(pin)])});
@@ -159,8 +182,93 @@ Settled settle(const cv::Mat1f& image, double noise, const Lattice& lattice, con
     lens = fit_lens(settled.marks, LensModel::radial2);
     if (drop_strays(settled, lens, board)) lens = fit_lens(settled.marks, LensModel::radial2);
   }
+  settled.lens = lens;
   settled.rms_mm = rms(residuals_mm(lens, settled.marks));
   return settled;
+}
+
+/// Throws where what was taken for pins lies between brighter spots that are narrower. Pins are
+/// narrow: in the square between four of them the mean darkening lies above the median.
+void refuse_exchanged(const Darkening& image, const Settled& settled, const Board& board) {
+  constexpr int kSamples = 12;  // along a side
+  const Lattice& lattice = *settled.lattice;
+  double sum = 0;
+  for (int row = 0; row + 1 < lattice.rows; ++row) {
+    for (int col = 0; col + 1 < lattice.cols; ++col) {
+      const Point corner = place_mm(board, lattice, row, col);
+      std::vector<double> levels;
+      for (int i = 0; i < kSamples * kSamples; ++i) {
+        const Point mm{corner.x + board.pitch_mm * (i % kSamples + 0.5) / kSamples,
+                       corner.y + board.pitch_mm * (i / kSamples + 0.5) / kSamples};
+        levels.push_back(at_nearest(image.levels, project(settled.lens, mm)));
+      }
+      const double mean =
+          std::accumulate(levels.begin(), levels.end(), 0.0) / static_cast<double>(levels.size());
+      std::ranges::sort(levels);
+      sum += mean - levels[levels.size() / 2];
+    }
+  }
+  if (sum >= 0) return;
+  throw std::runtime_error(
+      "board: the pins are brighter than their surroundings: the undeformed surface and the "
+      "pressed board are exchanged");
+}
+
+/// A board's outer line on one side, and what lies one line further out.
+struct Side {
+  const char* where;  ///< "left", ...
+  std::string line;   ///< "column 1", ...
+  int pins = 0;       ///< That the line has.
+  int found = 0;      ///< Of those.
+  int beyond = 0;     ///< What would pass for pins further out.
+};
+
+Side side_of(const Darkening& image, const Settled& settled, const Board& board, bool rows,
+             bool last) {
+  const Lattice& lattice = *settled.lattice;
+  const int count = rows ? lattice.rows : lattice.cols;
+  const int outer = last ? count - 1 : 0;
+  Side side{rows ? (last ? "bottom" : "top") : (last ? "right" : "left"),
+            fmt::format("{} {}", rows ? "row" : "column", outer + 1),
+            rows ? lattice.cols : lattice.rows, 0, 0};
+  for (const Mark& mark : settled.marks) {
+    side.found += static_cast<int>(index_of(rows ? mark.mm.y : mark.mm.x, count, board) == outer);
+  }
+  const PinFit fit(image.levels, board.pitch_mm, recon::central_mm_per_px(settled.lens));
+  std::vector<double> heights;
+  for (const Mark& mark : settled.marks) {
+    const auto peak = fit.find(settled.lens, mark.mm, kWithin * board.pitch_mm);
+    heights.push_back(peak ? peak->height : 0);
+  }
+  std::ranges::sort(heights);
+  const double usual = heights[heights.size() / 2];
+  for (int i = 0; i < side.pins; ++i) {
+    const int further = last ? count : -1;
+    const Point mm = place_mm(board, lattice, rows ? further : i, rows ? i : further);
+    const auto peak = fit.find(settled.lens, mm, kWithin * board.pitch_mm);
+    side.beyond +=
+        static_cast<int>(peak && peak->height > kNeighbours * usual &&
+                         peak->height > kSure * height_noise(image, fit, settled.lens, mm));
+  }
+  return side;
+}
+
+/// Throws where the lattice could as well lie one line further to a side: by that it would lose
+/// its outer line on the other side, which then has to show clearly more pins than it would gain.
+void refuse_shifted(const Darkening& image, const Settled& settled, const Board& board) {
+  for (const bool rows : {false, true}) {
+    const Side first = side_of(image, settled, board, rows, false);
+    const Side last = side_of(image, settled, board, rows, true);
+    for (const auto& [lost, gained] : {std::pair{&first, &last}, {&last, &first}}) {
+      if (2 * (lost->found - gained->beyond) >= lost->pins) continue;
+      throw std::runtime_error(fmt::format(
+          "board: the lattice of {}x{} pins may lie one {} off: at the {} {} of {} pins of {} are "
+          "found, at the {} {} beyond {}; light both sides and press the board in evenly, or give "
+          "the number of pins that the picture shows",
+          board.rows, board.cols, rows ? "row" : "column", lost->where, lost->found, lost->pins,
+          lost->line, gained->where, gained->beyond, gained->line));
+    }
+  }
 }
 
 /// Whether two lattices have the same points, found at other scales.
@@ -207,13 +315,12 @@ std::vector<Lattice> lattices_of(const cv::Mat1f& image, const Board& board) {
 PinPress find_pins(const cv::Mat1f& reference, const cv::Mat1f& frame, const Board& board) {
   constexpr std::size_t kTries = 30;
   constexpr int kMayMiss = 10;  // one in ten: a lattice that is a row off misses more
-  const cv::Mat1f image = relative_darkening(reference, frame);
-  std::vector<Lattice> lattices = lattices_of(image, board);
+  const Darkening image = relative_darkening(reference, frame);
+  std::vector<Lattice> lattices = lattices_of(image.levels, board);
   lattices.resize(std::min(lattices.size(), kTries));
-  const double noise = noise_of(image);
   Settled best;
   for (const Lattice& lattice : lattices) {
-    Settled settled = settle(image, noise, lattice, board);
+    Settled settled = settle(image, lattice, board);
     // The most pins; among windows and scales with equally many the most regular one.
     const bool better =
         best.lattice == nullptr || settled.missing.size() < best.missing.size() ||
@@ -227,6 +334,8 @@ PinPress find_pins(const cv::Mat1f& reference, const cv::Mat1f& frame, const Boa
                     "the same with the board pressed in, and the numbers of rows and columns",
                     board.rows, board.cols));
   }
+  refuse_exchanged(image, best, board);
+  refuse_shifted(image, best, board);
   const int pins = board.rows * board.cols;
   if (kMayMiss * static_cast<int>(best.missing.size()) > pins) refuse(best.missing, pins);
   PinPress press{
