@@ -286,7 +286,7 @@ void run_export(const cli::Context& context, const ExportOptions& options) {
   context.out << fmt::format("{}: {} frames, {} depth maps\n", report.output(), report.frames(),
                              report.maps());
   if (!report.damage().empty()) {
-    context.out << fmt::format("the recording is not whole ({}): all before that is exported\n",
+    context.out << fmt::format("not all of the recording could be read ({}): all the rest is exported\n",
                                report.damage());
   }
 }

@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <map>
+#include <optional>
 #include <set>
 #include <utility>
 
@@ -12,14 +14,17 @@
 namespace dtact::recording {
 namespace {
 
+/// None for a message that is no `Type`, which `file` then counts as unreadable.
 template <typename Type>
-Type parse(const mcap::Channel& channel, const mcap::Message& message) {
+std::optional<Type> parse(const mcap::Reader& file, const mcap::Channel& channel,
+                          const mcap::Message& message) {
   Type parsed;
-  if (!parsed.ParseFromArray(message.data.data(), static_cast<int>(message.data.size()))) {
-    throw mcap::Error(fmt::format("{}: message {} is no {}", channel.topic, message.sequence,
-                                  Type::descriptor()->full_name()));
+  if (parsed.ParseFromArray(message.data.data(), static_cast<int>(message.data.size()))) {
+    return parsed;
   }
-  return parsed;
+  file.count_unreadable(fmt::format("{}: message {} is no {}", channel.topic, message.sequence,
+                                    Type::descriptor()->full_name()));
+  return std::nullopt;
 }
 
 /// The topic is there and its messages are `schema`'s.
@@ -43,27 +48,37 @@ void read_recording(const mcap::Reader& file, const RecordingHandlers& handlers)
   if (handlers.frame) topics.insert({kFrameTopic, kCameraTopic});
   if (handlers.event) topics.insert(kEventTopic);
   if (handlers.status) topics.insert(kStatusTopic);
-  // A frame's JPEG stands before it.
-  std::pair<std::uint64_t, std::string> jpeg;
+  // A frame's JPEG stands before it, and with other writers some others between them.
+  constexpr std::size_t kWaiting = 8;
+  std::map<std::uint64_t, std::string> jpegs;  // by log time
+  bool any = false;
   file.read(topics, [&](const mcap::Channel& channel, const mcap::Message& message) {
     if (channel.topic == kCameraTopic) {
-      foxglove::CompressedImage image = parse<foxglove::CompressedImage>(channel, message);
-      jpeg = {message.log_time, std::move(*image.mutable_data())};
+      if (auto image = parse<foxglove::CompressedImage>(file, channel, message)) {
+        jpegs[message.log_time] = std::move(*image->mutable_data());
+        if (jpegs.size() > kWaiting) jpegs.erase(jpegs.begin());
+      }
       return true;
     }
     if (channel.topic == kEventTopic) {
-      return handlers.event(parse<v1::Event>(channel, message), message.log_time);
+      const auto event = parse<v1::Event>(file, channel, message);
+      return !event || handlers.event(*event, message.log_time);
     }
     if (channel.topic == kStatusTopic) {
-      return handlers.status(parse<v1::Status>(channel, message), message.log_time);
+      const auto status = parse<v1::Status>(file, channel, message);
+      return !status || handlers.status(*status, message.log_time);
     }
-    auto frame = parse<v1::Frame>(channel, message);
-    if (jpeg.first == message.log_time && !jpeg.second.empty()) {
-      frame.mutable_jpeg()->set_data(std::move(jpeg.second));
-      jpeg = {};
+    auto frame = parse<v1::Frame>(file, channel, message);
+    if (!frame) return true;
+    any = true;
+    if (auto jpeg = jpegs.extract(message.log_time); jpeg && !jpeg.mapped().empty()) {
+      frame->mutable_jpeg()->set_data(std::move(jpeg.mapped()));
     }
-    return handlers.frame(frame, message.log_time);
+    return handlers.frame(*frame, message.log_time);
   });
+  if (handlers.frame && !any && !file.damage().empty()) {
+    throw mcap::Error("no frame of it can be read: " + file.damage());
+  }
 }
 
 std::optional<mcap::AttachmentPlace> find_attachment(const mcap::Reader& file,

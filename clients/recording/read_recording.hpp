@@ -19,8 +19,9 @@ struct RecordingHandlers {
   std::function<bool(const v1::Status& status, std::uint64_t log_time)> status;
 };
 
-/// Goes through a recording in the order of the file. Throws mcap::Error when it is damaged or
-/// holds no dtact.v1.Frame.
+/// Goes through a recording in the order of the file. What cannot be read is passed over and
+/// counted in the file's damage(). Throws mcap::Error when no channel of it is of dtact.v1.Frame,
+/// and when it is damaged so that no frame can be read.
 void read_recording(const mcap::Reader& file, const RecordingHandlers& handlers);
 
 /// The last attachment of that name that was taken up to `log_time`, or the first of all; none when

@@ -3,6 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <iterator>
+#include <map>
+#include <optional>
 #include <utility>
 
 #include "hal/files/mcap_record_file.hpp"
@@ -48,6 +51,37 @@ Message take_message(Cursor fields) {
   return message;
 }
 
+/// What could not be read, and why the first of it.
+struct Unreadable {
+  std::uint64_t count = 0;
+  std::string first;
+
+  void add(const std::string& why) {
+    if (count++ == 0) first = why;
+  }
+};
+
+/// What the summary's statistics count.
+struct Statistics {
+  std::uint64_t messages = 0;
+  std::uint64_t schemas = 0;
+  std::uint64_t channels = 0;
+  std::uint64_t attachments = 0;
+  std::uint64_t metadata = 0;
+  std::uint64_t chunks = 0;
+};
+
+Statistics take_statistics(Cursor fields) {
+  Statistics statistics;
+  statistics.messages = fields.take<std::uint64_t>();
+  statistics.schemas = fields.take<std::uint16_t>();
+  statistics.channels = fields.take<std::uint32_t>();
+  statistics.attachments = fields.take<std::uint32_t>();
+  statistics.metadata = fields.take<std::uint32_t>();
+  statistics.chunks = fields.take<std::uint32_t>();
+  return statistics;
+}
+
 }  // namespace
 
 struct Reader::Impl {
@@ -57,6 +91,7 @@ struct Reader::Impl {
 
   void open();
   void read_summary(std::uint64_t footer);
+  [[nodiscard]] bool lists_everything() const;
   void scan();
   void add_scanned(Op op, std::uint64_t offset, std::uint64_t length);
   void add(const Cursor::Record& record);
@@ -70,7 +105,13 @@ struct Reader::Impl {
   std::vector<Place> places;
   std::vector<AttachmentPlace> attachments;
   std::vector<Metadata> metadata;
-  std::uint64_t indexed = 0;  ///< Bytes of records that the summary's index led to.
+  std::optional<Statistics> statistics;  ///< Of an intact summary.
+  // What the latest read() came upon, or the scan before the first.
+  Unreadable chunks;
+  Unreadable messages;
+  std::uint64_t out_of_order = 0;  ///< Messages earlier than one before in their channel.
+  std::uint64_t missing = 0;       ///< Messages that the statistics count and no chunk holds.
+  std::uint64_t indexed = 0;       ///< Bytes of records that the summary's index led to.
 };
 
 /// Records do not overlap: those of a whole file have no more bytes than it, however often a
@@ -92,19 +133,34 @@ void Reader::Impl::open() {
       file.load(file.size() - kMagic.size(), kMagic.size()) == kMagic) {
     try {
       read_summary(file.size() - tail);
-      if (!places.empty()) return;
-      why.clear();  // whole, but nothing in it is indexed
+      if (lists_everything()) return;
+      why.clear();  // whole, but not everything in it is indexed
     } catch (const Error& e) {
       why = e.what();
+      schemas.clear();
+      channels.clear();
+      places.clear();
+      statistics.reset();
     }
   }
-  schemas.clear();
-  channels.clear();
+  const std::vector<Place> of_index = std::exchange(places, {});
   attachments.clear();
   metadata.clear();
   indexed = 0;
   scan();
+  // Behind a record whose length is damaged the index still leads to chunks.
+  const std::uint64_t scanned = places.empty() ? 0 : places.back().offset;
+  std::ranges::copy_if(of_index, std::back_inserter(places),
+                       [scanned](const Place& place) { return place.offset > scanned; });
   if (damage.empty()) damage = std::exchange(why, {});
+}
+
+/// Writers may leave out of the summary what they like; only the statistics show it.
+bool Reader::Impl::lists_everything() const {
+  return statistics && statistics->schemas == schemas.size() &&
+         statistics->channels == channels.size() && statistics->chunks == places.size() &&
+         statistics->attachments == attachments.size() && statistics->metadata == metadata.size() &&
+         (statistics->messages == 0 || !places.empty());
 }
 
 void Reader::Impl::read_summary(std::uint64_t footer) {
@@ -136,6 +192,9 @@ void Reader::Impl::read_summary(std::uint64_t footer) {
         break;
       case Op::metadata_index:
         add_metadata(entry.take<std::uint64_t>());
+        break;
+      case Op::statistics:
+        statistics = take_statistics(entry);
         break;
       default:
         add(record);
@@ -180,7 +239,8 @@ void Reader::Impl::add_metadata(std::uint64_t offset) {
   metadata.push_back({std::move(key), fields.map()});
 }
 
-/// Scans the data. Stops at the first damaged or truncated record and reports it in `damage`.
+/// Scans the data. Stops at the first record outside of chunks that is damaged or truncated, and
+/// reports it in `damage`.
 void Reader::Impl::scan() {
   std::uint64_t offset = kMagic.size();
   try {
@@ -215,10 +275,14 @@ void Reader::Impl::add_scanned(Op op, std::uint64_t offset, std::uint64_t length
       places.push_back({offset, false});
       break;
     case Op::chunk: {
-      const std::string records = file.load_chunk(offset);
-      Cursor inside = file.cursor(records, offset);
-      while (inside.left() > 0) add(inside.record());
       places.push_back({offset, true});
+      try {
+        const std::string records = file.load_chunk(offset);
+        Cursor inside = file.cursor(records, offset);
+        while (inside.left() > 0) add(inside.record());
+      } catch (const Error& e) {
+        chunks.add(e.what());
+      }
       break;
     }
     case Op::attachment:
@@ -239,7 +303,31 @@ Reader::Reader(const std::filesystem::path& path) : impl_(std::make_unique<Impl>
 
 Reader::~Reader() = default;
 
-const std::string& Reader::damage() const noexcept { return impl_->damage; }
+std::string Reader::damage() const {
+  std::string text = impl_->damage;
+  const auto add = [&text](const std::string& sentence) {
+    text += (text.empty() ? "" : "; ") + sentence;
+  };
+  if (const Unreadable& chunks = impl_->chunks; chunks.count > 0) {
+    add(fmt::format("{} of {} chunks cannot be read, the first because of {}", chunks.count,
+                    impl_->places.size(), chunks.first));
+  }
+  if (const Unreadable& messages = impl_->messages; messages.count > 0) {
+    add(fmt::format("{} message(s) cannot be read, the first because of {}", messages.count,
+                    messages.first));
+  }
+  if (impl_->missing > 0) {
+    add(fmt::format("{} of {} messages are not there", impl_->missing,
+                    impl_->statistics->messages));
+  }
+  if (impl_->out_of_order > 0) {
+    add(fmt::format("{} message(s) are earlier than one before them", impl_->out_of_order));
+  }
+  return text;
+}
+
+void Reader::count_unreadable(const std::string& why) const { impl_->messages.add(why); }
+
 const std::map<std::uint16_t, Schema>& Reader::schemas() const noexcept { return impl_->schemas; }
 const std::map<std::uint16_t, Channel>& Reader::channels() const noexcept {
   return impl_->channels;
@@ -267,29 +355,56 @@ Attachment Reader::attachment(const AttachmentPlace& place) const {
 
 void Reader::read(const std::set<std::string>& topics,
                   const std::function<bool(const Channel&, const Message&)>& take) const {
-  // False: enough.
+  Impl& impl = *impl_;
+  impl.chunks = {};
+  impl.messages = {};
+  impl.missing = 0;
+  impl.out_of_order = 0;
+  std::uint64_t seen = 0;
+  std::map<std::uint16_t, std::uint64_t> newest;  // log time by channel
+  // False: enough. What `take` throws is its own.
   const auto offer = [&](const Cursor::Record& record) {
-    const Cursor fields = impl_->file.cursor(record.fields, record.offset + kRecordHead);
+    const Cursor fields = impl.file.cursor(record.fields, record.offset + kRecordHead);
+    ++seen;
+    if (record.fields.size() < kMessageHead) {
+      impl.messages.add(fmt::format("byte {}: a message without its head", record.offset));
+      return true;
+    }
     const Message message = take_message(fields);
-    const auto channel = impl_->channels.find(message.channel);
-    if (channel == impl_->channels.end()) {
-      fields.fail(
-          fmt::format("a message of channel {}, which is not in the file", message.channel));
+    const auto channel = impl.channels.find(message.channel);
+    if (channel == impl.channels.end()) {
+      impl.messages.add(fmt::format("byte {}: a message of channel {}, which is not in the file",
+                                    record.offset, message.channel));
+      return true;
     }
-    return !topics.contains(channel->second.topic) || take(channel->second, message);
+    if (!topics.contains(channel->second.topic)) return true;
+    std::uint64_t& latest = newest[message.channel];
+    if (message.log_time < latest) ++impl.out_of_order;
+    latest = std::max(latest, message.log_time);
+    return take(channel->second, message);
   };
-  for (const Place& place : impl_->places) {
-    if (place.chunk) {
-      const std::string records = impl_->file.load_chunk(place.offset);
-      Cursor inside = impl_->file.cursor(records, place.offset);
-      while (inside.left() > 0) {
-        const auto record = inside.record();
-        if (record.op == Op::message && !offer(record)) return;
+  for (const Place& place : impl.places) {
+    std::string records;
+    std::vector<Cursor::Record> inside;
+    try {
+      records = place.chunk ? impl.file.load_chunk(place.offset)
+                            : impl.file.load_record(place.offset, Op::message);
+      if (place.chunk) {
+        Cursor cursor = impl.file.cursor(records, place.offset);
+        while (cursor.left() > 0) inside.push_back(cursor.record());
+      } else {
+        inside.push_back({Op::message, records, place.offset});
       }
-    } else {
-      const std::string fields = impl_->file.load_record(place.offset, Op::message);
-      if (!offer({Op::message, fields, place.offset})) return;
+    } catch (const Error& e) {
+      // What stands before the damage in a chunk that decompressed is read nevertheless.
+      impl.chunks.add(e.what());
     }
+    for (const Cursor::Record& record : inside) {
+      if (record.op == Op::message && !offer(record)) return;
+    }
+  }
+  if (impl.statistics && impl.statistics->messages > seen) {
+    impl.missing = impl.statistics->messages - seen;
   }
 }
 

@@ -23,9 +23,9 @@ struct AttachmentPlace {
   std::uint64_t offset = 0;  ///< position of the record
 };
 
-/// Reads an MCAP file of any writer by its summary. Without an intact summary it scans the file up
-/// to the first damage; so it can read the file of a killed
-/// writer. Holds one chunk in memory. One thread.
+/// Reads an MCAP file of any writer by its summary. Where that is missing, damaged or does not
+/// list everything that its statistics count, the reader scans the file; so it can read the file
+/// of a killed writer. Holds one chunk in memory. One thread.
 class Reader {
  public:
   /// Throws Error when the file is no MCAP, std::system_error when it cannot be read.
@@ -34,8 +34,11 @@ class Reader {
   Reader(const Reader&) = delete;
   Reader& operator=(const Reader&) = delete;
 
-  /// Empty when the file is whole; else where it ends or is damaged: what is read is up to there.
-  [[nodiscard]] const std::string& damage() const noexcept;
+  /// Empty when the file is whole; else where it ends or is damaged, and what the latest read()
+  /// could not read: so many chunks and messages, the first with its reason.
+  [[nodiscard]] std::string damage() const;
+  /// To be called in read() for a message that its reader cannot use; damage() then counts it.
+  void count_unreadable(const std::string& why) const;
   [[nodiscard]] const std::map<std::uint16_t, Schema>& schemas() const noexcept;
   [[nodiscard]] const std::map<std::uint16_t, Channel>& channels() const noexcept;
   /// In the order of the file.
@@ -46,8 +49,8 @@ class Reader {
   [[nodiscard]] Attachment attachment(const AttachmentPlace& place) const;
 
   /// All messages of these topics in the order of the file (each writer's own; nearly that of their
-  /// times), until `take` returns false. What a message views is valid during the call. Throws
-  /// Error when a chunk is damaged, after the messages before it.
+  /// times), until `take` returns false. What a message views is valid during the call. Damaged
+  /// chunks and messages are passed over and counted in damage().
   void read(const std::set<std::string>& topics,
             const std::function<bool(const Channel&, const Message&)>& take) const;
 

@@ -2,9 +2,10 @@
 
 #include <algorithm>
 #include <map>
-#include <optional>
+#include <stdexcept>
 #include <string_view>
 #include <utility>
+#include <vector>
 
 #include "hal/files/mcap_reader.hpp"
 #include "hal/replay/recording.hpp"
@@ -103,38 +104,59 @@ std::string find_topic(const mcap::Reader& reader, const fs::path& file) {
 Recording load_mcap(const fs::path& file) {
   const mcap::Reader reader(file);
   const std::string topic = find_topic(reader, file);
-  Recording recording;
-  mjpeg::GreyDecoder decoder(1, 1);  // for headers only
+  struct Frame {
+    std::uint64_t time = 0;
+    std::string jpeg;
+  };
+  std::vector<Frame> frames;
   std::size_t bytes = 0;
-  std::optional<std::uint64_t> first;
+  std::uint64_t number = 0;
   reader.read({topic}, [&](const mcap::Channel&, const mcap::Message& message) {
-    const std::string name =
-        fmt::format("{}: {}, message {}", file.string(), topic, recording.count());
+    const std::string name = fmt::format("{}, message {}", topic, number++);
     Fields fields;
-    if (!fields.parse(message.data)) fail(name, "is no " + std::string(kSchema));
-    if (fields.at(kFormat) != "jpeg") {
-      fail(name, fmt::format("its format is \"{}\": only jpeg is played",
-                             fields.at(kFormat).substr(0, 16)));
+    if (!fields.parse(message.data)) {
+      reader.count_unreadable(fmt::format("{}: is no {}", name, kSchema));
+    } else if (fields.at(kFormat) != "jpeg") {
+      reader.count_unreadable(fmt::format("{}: its format is \"{}\": only jpeg is played", name,
+                                          fields.at(kFormat).substr(0, 16)));
+    } else {
+      frames.push_back({message.log_time, std::string(fields.at(kData))});
+      bytes += frames.back().jpeg.size();
     }
-    add_jpeg(recording, std::string(fields.at(kData)), decoder, name);
-    bytes += recording.payloads.back().size();
     if (bytes > kMaxBytes) {
       fail(file, fmt::format("more than {} MiB of frames, of which {} are read: record less",
-                             kMaxBytes >> 20U, recording.count()));
+                             kMaxBytes >> 20U, frames.size()));
     }
-    if (!first) first = message.log_time;
-    if (message.log_time < *first ||
-        message.log_time - *first > static_cast<std::uint64_t>(kLongestNs)) {
-      fail(name, "its time is before the first frame's, or more than a year after it");
-    }
-    const auto offset = static_cast<std::int64_t>(message.log_time - *first);
-    if (!recording.offsets_ns.empty() && offset <= recording.offsets_ns.back()) {
-      fail(name, "is not later than the frame before it");
-    }
-    recording.offsets_ns.push_back(offset);
     return true;
   });
-  if (recording.count() == 0) fail(file, "holds no frame of the camera");
+  std::ranges::stable_sort(frames, {}, &Frame::time);
+  Recording recording;
+  mjpeg::GreyDecoder decoder(1, 1);  // for headers only
+  std::uint64_t first = 0;
+  for (Frame& frame : frames) {
+    const std::string name = fmt::format("{}, the frame at {} ns", topic, frame.time);
+    try {
+      if (recording.count() > 0) {
+        if (frame.time - first > static_cast<std::uint64_t>(kLongestNs)) {
+          fail(name, "its time is more than a year after the first frame's");
+        }
+        if (static_cast<std::int64_t>(frame.time - first) == recording.offsets_ns.back()) {
+          fail(name, "another frame has the same time");
+        }
+      }
+      add_jpeg(recording, std::move(frame.jpeg), decoder, name);
+    } catch (const std::runtime_error& e) {
+      reader.count_unreadable(e.what());
+      continue;
+    }
+    if (recording.count() == 1) first = frame.time;
+    recording.offsets_ns.push_back(static_cast<std::int64_t>(frame.time - first));
+  }
+  recording.left_out = reader.damage();
+  if (recording.count() == 0) {
+    fail(file, recording.left_out.empty() ? "holds no frame of the camera"
+                                          : "no frame can be played: " + recording.left_out);
+  }
   return recording;
 }
 

@@ -15,7 +15,7 @@ namespace dtact::hal::replay {
 /// are in the order of their names. `timestamps.csv` beside them, if there, says when each was
 /// taken: lines of "file name,nanoseconds", rising, one for each frame, after an optional first
 /// line that names the columns. Or the camera's JPEGs of an MCAP file (dtactctl record): the
-/// messages of its one channel of foxglove.CompressedImage, with their log times, in their order.
+/// messages of its one channel of foxglove.CompressedImage, in the order of their log times.
 struct Recording {
   int width = 0;                         ///< Pixels, of every frame.
   int height = 0;                        ///< Pixels.
@@ -23,6 +23,8 @@ struct Recording {
   std::vector<std::string> payloads;     ///< for a JPEG recording
   /// Time of each frame, nanoseconds after the first; empty without timestamps.csv.
   std::vector<std::int64_t> offsets_ns;
+  /// What of an MCAP file cannot be played, and why; empty: nothing is left out.
+  std::string left_out;
 
   [[nodiscard]] bool is_jpeg() const noexcept { return images.empty(); }
   [[nodiscard]] std::size_t count() const noexcept {
@@ -34,7 +36,8 @@ struct Recording {
 inline constexpr std::size_t kMaxBytes = std::size_t{1} << 30U;
 
 /// Reads the whole folder, or a file whose name ends in .mcap; of one that is not whole, what is
-/// there. Throws std::runtime_error naming the file (and line) and the fix: no frames, both
+/// there, its frames that are no JPEG of one size left out. Throws std::runtime_error naming the
+/// file (and line) and the fix: no frames, both
 /// kinds, different sizes, an unreadable file, too much memory, bad timestamps.
 [[nodiscard]] Recording load_recording(const std::filesystem::path& path);
 

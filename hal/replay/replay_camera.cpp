@@ -50,6 +50,9 @@ CameraReport ReplayCamera::report() const {
   report.delivered = delivered_;
   report.skipped = skipped_;
   report.damaged = damaged_;
+  if (!recording_.left_out.empty()) {
+    report.fix = "not all of the recording is played: " + recording_.left_out;
+  }
   if (ended_) {
     report.state = CameraState::ended;
     report.fix = "the recording has been played: set camera.replay.loop = true to repeat it";

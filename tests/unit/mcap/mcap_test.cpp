@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "hal/base/atomic_file.hpp"
+#include "hal/files/mcap_bytes.hpp"
 #include "hal/files/mcap_reader.hpp"
 #include "hal/files/mcap_writer.hpp"
 #include "tests/fakes/own_path.hpp"
@@ -266,12 +267,18 @@ TEST_F(Mcap, SaysWhereAFileIsDamaged) {
   const std::size_t index = flipped.find(std::string("\x07\x16\0\0\0\0\0\0\0", 9));
   ASSERT_NE(index, std::string::npos);
   flipped[index - 1] = static_cast<char>(flipped[index - 1] ^ 1);
-  EXPECT_THAT(failure(flipped),
-              ThrowsMessage<Error>(AllOf(HasSubstr("a.mcap: byte "), HasSubstr("chunk"))));
+  const auto damage = [this](const std::string& bytes) {
+    write(bytes);
+    const Reader reader(file());
+    EXPECT_THAT(read(reader), IsEmpty());
+    return reader.damage();
+  };
+  EXPECT_THAT(damage(flipped), AllOf(HasSubstr("1 of 1 chunks cannot be read, the first because"),
+                                     HasSubstr("a.mcap: byte "), HasSubstr("1 of 1 messages")));
   // The size in its header.
   std::string huge = sink.bytes;
   huge[begin + kRecordHead + 16 + 7] = '\x7f';
-  EXPECT_THAT(failure(huge), ThrowsMessage<Error>(HasSubstr("at most 268435456 are read")));
+  EXPECT_THAT(damage(huge), HasSubstr("at most 268435456 are read"));
   // A byte of the summary is damaged: the reader scans the data instead.
   std::string summary = sink.bytes;
   summary[summary.size() - 60] = static_cast<char>(summary[summary.size() - 60] ^ 1);
@@ -280,6 +287,140 @@ TEST_F(Mcap, SaysWhereAFileIsDamaged) {
   EXPECT_THAT(reader.damage(), HasSubstr("the summary's CRC is wrong"));
   EXPECT_THAT(read(reader), SizeIs(1));
   EXPECT_THROW(Reader(file().string() + "x"), std::system_error);
+}
+
+/// A file as other writers leave it: the records of `data` and of `summary`, without a CRC.
+std::string file_of(const std::string& data, const std::string& summary) {
+  std::string bytes(kMagic);
+  put_record(bytes, Op::header, std::string(8, '\0'));
+  bytes += data;
+  put_record(bytes, Op::data_end, std::string(4, '\0'));
+  std::string footer;
+  put(footer, summary.empty() ? std::uint64_t{0} : std::uint64_t{bytes.size()});
+  put(footer, std::uint64_t{0});
+  put(footer, std::uint32_t{0});
+  bytes += summary;
+  put_record(bytes, Op::footer, footer);
+  return bytes + std::string(kMagic);
+}
+std::string channel_of(std::uint16_t id, const std::string& topic) {
+  std::string fields;
+  put(fields, id);
+  put(fields, std::uint16_t{0});
+  put_string(fields, topic);
+  put_string(fields, "json");
+  put_map(fields, {});
+  std::string record;
+  put_record(record, Op::channel, fields);
+  return record;
+}
+std::string message_of(std::uint16_t channel, std::uint32_t sequence, std::uint64_t time) {
+  std::string fields;
+  put(fields, channel);
+  put(fields, sequence);
+  put(fields, time);
+  put(fields, time);
+  std::string record;
+  put_record(record, Op::message, fields + "x");
+  return record;
+}
+/// Not compressed.
+std::string chunk_of(const std::string& records) {
+  std::string fields(16, '\0');
+  put(fields, std::uint64_t{records.size()});
+  put(fields, crc32(records));
+  put_string(fields, "");
+  put(fields, std::uint64_t{records.size()});
+  std::string record;
+  put_record(record, Op::chunk, fields + records);
+  return record;
+}
+std::string attachment_of(const std::string& name) {
+  std::string fields(16, '\0');
+  put_string(fields, name);
+  put_string(fields, "text/plain");
+  put(fields, std::uint64_t{0});
+  put(fields, std::uint32_t{0});
+  std::string record;
+  put_record(record, Op::attachment, fields);
+  return record;
+}
+std::string index_of(std::uint64_t chunk) {
+  std::string fields(16, '\0');
+  put(fields, chunk);
+  std::string record;
+  put_record(record, Op::chunk_index, fields);
+  return record;
+}
+std::string statistics_of(std::uint64_t messages, std::uint32_t channels, std::uint32_t attachments,
+                          std::uint32_t chunks) {
+  std::string fields;
+  put(fields, messages);
+  put(fields, std::uint16_t{0});
+  put(fields, channels);
+  put(fields, attachments);
+  put(fields, std::uint32_t{0});
+  put(fields, chunks);
+  std::string record;
+  put_record(record, Op::statistics, fields);
+  return record;
+}
+/// Where file_of() puts `data`.
+constexpr std::uint64_t kData = 8 + kRecordHead + 8;
+
+// Neither is in the summary, whose writer may leave out what it likes.
+TEST_F(Mcap, FindsChannelsAndAttachmentsThatTheSummaryLeavesOut) {
+  const std::string data =
+      chunk_of(channel_of(3, "/t") + message_of(3, 1, 10)) + attachment_of("a");
+  for (const std::string& statistics : {std::string(), statistics_of(1, 1, 1, 1)}) {
+    write(file_of(data, index_of(kData) + statistics));
+    const Reader reader(file());
+    EXPECT_THAT(reader.channels(), SizeIs(1));
+    ASSERT_THAT(reader.attachments(), SizeIs(1));
+    EXPECT_EQ(reader.attachments()[0].name, "a");
+    EXPECT_THAT(read(reader), ElementsAre(std::tuple(1, 10, "x")));
+    EXPECT_EQ(reader.damage(), "");
+  }
+}
+
+TEST_F(Mcap, PassesOverWhatIsDamagedAndCountsIt) {
+  std::string broken = chunk_of(message_of(3, 2, 20));
+  broken.back() = 'y';  // its CRC
+  const std::string data =
+      channel_of(3, "/t") + chunk_of(message_of(3, 1, 10)) + broken +
+      chunk_of(message_of(3, 4, 40) + message_of(7, 9, 41) + message_of(3, 3, 30)) +
+      message_of(3, 5, 50);
+  write(file_of(data, ""));
+  const Reader reader(file());
+  EXPECT_THAT(read(reader), ElementsAre(std::tuple(1, 10, "x"), std::tuple(4, 40, "x"),
+                                        std::tuple(3, 30, "x"), std::tuple(5, 50, "x")));
+  EXPECT_THAT(reader.damage(),
+              AllOf(HasSubstr("1 of 4 chunks cannot be read, the first because of "),
+                    HasSubstr("CRC is wrong"), HasSubstr("1 message(s) cannot be read"),
+                    HasSubstr("channel 7"), HasSubstr("1 message(s) are earlier")));
+}
+
+TEST_F(Mcap, ReportsMessagesThatAreCountedAndNotThere) {
+  const std::string data = channel_of(3, "/t") + chunk_of(message_of(3, 1, 10));
+  write(file_of(data, channel_of(3, "/t") + index_of(kData + channel_of(3, "/t").size()) +
+                          statistics_of(3, 1, 0, 1)));
+  const Reader reader(file());
+  EXPECT_THAT(read(reader), SizeIs(1));
+  EXPECT_EQ(reader.damage(), "2 of 3 messages are not there");
+}
+
+// The scan ends at the damaged length, and the index leads on.
+TEST_F(Mcap, GoesOnBehindARecordWithoutALengthByTheIndex) {
+  const std::string first = chunk_of(channel_of(3, "/t") + message_of(3, 1, 10));
+  std::string second = chunk_of(message_of(3, 2, 20));
+  second[8] = '\x7f';
+  const std::string third = chunk_of(message_of(3, 3, 30));
+  write(file_of(first + second + third, index_of(kData) + index_of(kData + first.size()) +
+                                            index_of(kData + first.size() + second.size()) +
+                                            statistics_of(3, 1, 0, 3)));
+  const Reader reader(file());
+  EXPECT_THAT(read(reader), ElementsAre(std::tuple(1, 10, "x"), std::tuple(3, 30, "x")));
+  EXPECT_THAT(reader.damage(), AllOf(HasSubstr("1 of 3 chunks"), HasSubstr("1 of 3 messages")));
 }
 
 TEST_F(Mcap, AnIndexThatPointsAtARecordAgainAndAgainIsLeft) {

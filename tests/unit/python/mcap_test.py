@@ -67,7 +67,7 @@ class Read(unittest.TestCase):
                   + message(6, jpeg(b"last"), 40) + message(3, frame(4).frame, 40))
         with tempfile.TemporaryDirectory() as folder:
             file = pathlib.Path(folder, "press.mcap")
-            file.write_bytes(MAGIC + CHANNELS + channel(6, "/camera/jpeg") + chunk(inside))
+            file.write_bytes(MAGIC + CHANNELS + channel(6, "/camera/jpeg") + chunk(inside) + MAGIC)
             frames = list(dtact.read(file))
         self.assertEqual([f.jpeg if f.has_jpeg else None for f in frames],
                          [b"first", None, None, b"last"])
@@ -75,7 +75,34 @@ class Read(unittest.TestCase):
     def test_one_that_was_cut_off(self):
         first, second = chunk(message(3, frame(1).frame)), chunk(message(3, frame(2).frame))
         for cut in (0, 1, 8, 9, len(second) - 1):
-            self.assertEqual(self.read(MAGIC, CHANNELS, first, second[:cut]), [1])
+            with self.assertWarnsRegex(RuntimeWarning, "was killed"):
+                self.assertEqual(self.read(MAGIC, CHANNELS, first, second[:cut]), [1])
+
+    def test_what_cannot_be_read_among_what_can(self):
+        def of(number):
+            return message(3, frame(number).frame)
+
+        undecodable = record(5, struct.pack("<HIQQ", 3, 0, 1, 1) + b"\xff\xff")
+        unknown = message(9, frame(7).frame)
+        damaged = chunk(of(4))[:-8] + bytes(8)
+        inside_out = of(5) + record(5, b"x" * 30)[:20]
+        with self.assertWarnsRegex(
+                RuntimeWarning, r"2 chunk\(s\) cannot be read; 2 message\(s\) cannot be read"):
+            read = self.read(MAGIC, CHANNELS, chunk(of(1) + undecodable + of(2)), of(3), damaged,
+                             chunk(inside_out), unknown, chunk(of(6)), MAGIC)
+        self.assertEqual(read, [1, 2, 3, 5, 6])
+
+    def test_frames_out_of_order_get_their_own_jpegs(self):
+        def jpeg(data):
+            return b"\x12" + bytes([len(data)]) + data + b"\x1a\x04jpeg"
+
+        inside = (message(6, jpeg(b"late"), 20) + message(6, jpeg(b"early"), 10)
+                  + message(3, frame(2).frame, 20) + message(3, frame(1).frame, 10))
+        with tempfile.TemporaryDirectory() as folder:
+            file = pathlib.Path(folder, "press.mcap")
+            file.write_bytes(MAGIC + CHANNELS + channel(6, "/camera/jpeg") + chunk(inside) + MAGIC)
+            frames = list(dtact.read(file))
+        self.assertEqual([(f.sequence, f.jpeg) for f in frames], [(2, b"late"), (1, b"early")])
 
     def test_damage(self):
         good = message(3, frame(1).frame)

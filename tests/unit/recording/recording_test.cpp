@@ -170,6 +170,28 @@ TEST_F(RecordingFile, FindsTheAttachmentOfATime) {
   EXPECT_FALSE(find_attachment(reader, "b"));
 }
 
+TEST_F(RecordingFile, AnUndecodableFrameAmongGoodOnesIsCounted) {
+  mcap::Writer writer(sink_);
+  const auto channel = writer.add_channel(writer.add_schema("dtact.v1.Frame", "protobuf", ""),
+                                          kFrameTopic, "protobuf");
+  const std::string good = sample_frame(5).SerializeAsString();
+  writer.add(mcap::Message{channel, 0, 10, 10, good});
+  writer.add(mcap::Message{channel, 1, 20, 20, "\xff\xff"});
+  writer.add(mcap::Message{channel, 2, 30, 30, good});
+  writer.finish();
+  const mcap::Reader reader(path_);
+  std::vector<std::uint64_t> times;
+  RecordingHandlers handlers;
+  handlers.frame = [&](const v1::Frame&, std::uint64_t time) {
+    times.push_back(time);
+    return true;
+  };
+  read_recording(reader, handlers);
+  EXPECT_THAT(times, ElementsAre(10, 30));
+  EXPECT_THAT(reader.damage(), HasSubstr("1 message(s) cannot be read, the first because of "
+                                         "/dtact/frame: message 1 is no dtact.v1.Frame"));
+}
+
 TEST_F(RecordingFile, RefusesAFileOfSomethingElse) {
   mcap::Writer writer(sink_);
   writer.finish();
