@@ -22,6 +22,16 @@ evaluate sensor_a
 evaluate sensor_b
 evaluate sensor_c
 
+# imported SENSOR: the whole way of a user who has such a folder.
+imported() {
+  local images=../shared/data/$1
+  [[ -d $images ]] || return 0
+  echo "== $1, real images, imported"
+  "$bin/dtact-calibrate" import "$images" -o "$out/$1_imported"
+}
+imported sensor_a
+imported sensor_b
+
 # raw SENSOR MM_PER_PX: the same ball on the unrectified frame, without a lens.
 raw() {
   local images=../shared/data/$1

@@ -19,19 +19,27 @@ namespace {
 
 constexpr int kHalves = 8;  // directions of the cut, 45 degrees apart
 
-/// Median and the mean distance from it: the offset that minimises the mean absolute error.
+/// Median, the offset that minimises the mean absolute error, and the distances from it.
 struct Spread {
   double offset = 0;
   double mean = 0;
+  double median = 0;
+  double within = 0;  ///< 95 % of them.
 };
 
 Spread spread_of(std::vector<double> errors) {
   if (errors.empty()) return {};
   const auto middle = errors.begin() + static_cast<std::ptrdiff_t>(errors.size() / 2);
   std::ranges::nth_element(errors, middle);
-  Spread spread{*middle, 0};
-  for (const double error : errors) spread.mean += std::abs(error - spread.offset);
+  Spread spread{.offset = *middle};
+  for (double& error : errors) {
+    error = std::abs(error - spread.offset);
+    spread.mean += error;
+  }
   spread.mean /= static_cast<double>(errors.size());
+  std::ranges::sort(errors);
+  spread.median = errors[errors.size() / 2];
+  spread.within = errors[errors.size() * 95 / 100];
   return spread;
 }
 
@@ -151,6 +159,8 @@ Evaluation read(const recon::Model& model, const SettledPress& press,
   const Spread spread = spread_of(std::move(errors));
   result.offset_mm = spread.offset;
   result.mae_mm = spread.mean;
+  result.median_mm = spread.median;
+  result.within_mm = spread.within;
   return result;
 }
 

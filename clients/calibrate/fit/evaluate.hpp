@@ -22,6 +22,8 @@ struct Evaluation {
   double drift_levels = 0;  ///< Subtracted from the darkening; see far_field_drift().
   double offset_mm = 0;     ///< Depth minus sphere, the median over the contact.
   double mae_mm = 0;        ///< Mean absolute error without the offset.
+  double median_mm = 0;     ///< Its median.
+  double within_mm = 0;     ///< What 95 % of the pixels stay within.
   double raw_mae_mm = 0;    ///< Mean absolute error with it.
   /// The press's own gain and the errors that chose it. It is removed in the two below only.
   /// Both are empty for the published method.

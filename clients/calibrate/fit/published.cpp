@@ -162,14 +162,19 @@ recon::DepthLut fit_published(const image::Grey8& reference, const image::Grey8&
   depth.resize(static_cast<std::size_t>(count.rend() - last));
   fill_gaps(depth, count);
 
+  return published_lut(depth);
+}
+
+recon::DepthLut published_lut(const std::vector<double>& depth_mm) {
   recon::DepthLut lut;
-  const double zero = depth[std::min<std::size_t>(kThresholdLevel, depth.size() - 1)];
+  const double zero = depth_mm[std::min<std::size_t>(kThresholdLevel, depth_mm.size() - 1)];
   constexpr int kStep = recon::kEntriesPerLevel;
-  const int last_level = static_cast<int>(depth.size()) - 1;
+  const int last_level = static_cast<int>(depth_mm.size()) - 1;
   for (int q6 = 0; q6 <= last_level * kStep; ++q6) {
     const int level = (q6 + kStep / 2) / kStep;
-    const double mm =
-        level <= kThresholdLevel ? 0 : std::max(0.0, depth[static_cast<std::size_t>(level)] - zero);
+    const double mm = level <= kThresholdLevel
+                          ? 0
+                          : std::max(0.0, depth_mm[static_cast<std::size_t>(level)] - zero);
     lut.um.push_back(static_cast<std::int16_t>(std::min(16383L, std::lround(1000 * mm))));
   }
   lut.covered_to_q6 = last_level * kStep;

@@ -28,20 +28,6 @@ struct LensOptions {
   std::string output;
 };
 
-/// Parses "7x9".
-std::pair<int, int> pair_of(const std::string& text, const char* option) {
-  int first = 0;
-  int second = 0;
-  char rest = 0;
-  // NOLINTNEXTLINE(cert-err34-c): the count says what was read, the range is checked below
-  if (std::sscanf(text.c_str(), "%4dx%4d%c", &first, &second, &rest) != 2 || first < 2 ||
-      second < 2 || first > 100 || second > 100) {
-    throw std::runtime_error(fmt::format(
-        "{}: \"{}\" is not allowed; expected two numbers from 2 to 100 as 7x9", option, text));
-  }
-  return {first, second};
-}
-
 void write(const LensOptions& options, const ImageSet& images, const ChosenLens& chosen,
            const std::optional<recon::FlatFieldGain>& gain, const std::vector<std::string>& what) {
   calibration::LensFile file{images.width(), images.height(),

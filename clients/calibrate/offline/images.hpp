@@ -2,6 +2,7 @@
 
 #include <opencv2/core.hpp>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "clients/calibrate/offline/images.hpp"
@@ -31,6 +32,9 @@ struct ImageSet {
 /// Throws std::runtime_error when two sets differ in size.
 void require_same_size(const ImageSet& a, const std::string& a_option, const ImageSet& b,
                        const std::string& b_option);
+
+/// Two numbers from 2 to 100, as "7x9". Throws std::runtime_error naming the option.
+[[nodiscard]] std::pair<int, int> pair_of(const std::string& text, const char* option);
 
 /// The mean of a set, grey levels.
 [[nodiscard]] cv::Mat1f mean_levels(const ImageSet& set);

@@ -17,12 +17,16 @@ void add_apply(CLI::App& app);
 /// `json` is read when the command runs; then it prints one JSON object instead of sentences.
 void add_evaluate(CLI::App& app, const bool& json);
 
+/// import DIR -o cal/
+void add_import(CLI::App& app);
+
 /// Adds all of the above.
 inline void add_offline_commands(CLI::App& app, const bool& json) {
   add_calibrate(app);
   add_calibrate_lens(app);
   add_apply(app);
   add_evaluate(app, json);
+  add_import(app);
 }
 
 }  // namespace dtact::ctl
