@@ -31,8 +31,17 @@ struct RecordOptions {
   bool progress = false;
 };
 
-v1::Subscribe subscription_for(const RecordOptions& options) {
+/// Of dtactd depth and images; of dtact-perceive, which has none, points and poses.
+v1::Subscribe subscription_for(const client::Client& client, const RecordOptions& options) {
   v1::Subscribe subscription;
+  if (client.has_feature("cloud")) {
+    subscription.set_summary(true);
+    subscription.set_cloud(v1::CLOUD_FLOAT32);
+    subscription.set_contact_box(true);
+    subscription.set_decimation(2);
+    subscription.set_pose(true);
+    return subscription;
+  }
   subscription.set_depth(v1::DEPTH_PREDICT_ZSTD);
   subscription.set_summary(true);
   subscription.set_jpeg(!options.no_jpeg);
@@ -54,7 +63,7 @@ class Recording {
     // Before frames come: while an answer is waited for only the newest few are kept.
     const v1::Status status = client_.status();
     fetch_files();
-    client_.subscribe(subscription_for(options_));
+    client_.subscribe(subscription_for(client_, options_));
     const auto end = options_.seconds > 0
                          ? began_ + milliseconds(static_cast<std::int64_t>(options_.seconds * 1e3))
                          : Clock::time_point::max();

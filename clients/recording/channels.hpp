@@ -10,6 +10,9 @@ inline constexpr const char* kLightTopic = "/dtact/light";
 inline constexpr const char* kStatusTopic = "/dtact/status";
 inline constexpr const char* kDepthTopic = "/dtact/depth";
 inline constexpr const char* kCameraTopic = "/camera/jpeg";
+inline constexpr const char* kPointsTopic = "/dtact/points";
+inline constexpr const char* kPoseTopic = "/dtact/pose";
+inline constexpr const char* kTransformsTopic = "/tf";
 
 inline constexpr const char* kCalibrationToml = "calibration.toml";
 inline constexpr const char* kReferencePng = "reference.png";

@@ -6,6 +6,7 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <numbers>
 #include <set>
 #include <vector>
 
@@ -30,12 +31,32 @@ void add_files(const google::protobuf::FileDescriptor& file,
   file.CopyTo(set.add_file());
 }
 
-template <typename Image>
-void stamp(Image& image, std::uint64_t ns, const std::string& frame_id) {
+template <typename Message>
+void stamp(Message& message, std::uint64_t ns) {
   constexpr std::uint64_t kSecond = 1'000'000'000;
-  image.mutable_timestamp()->set_seconds(static_cast<std::int64_t>(ns / kSecond));
-  image.mutable_timestamp()->set_nanos(static_cast<std::int32_t>(ns % kSecond));
-  image.set_frame_id(frame_id);
+  message.mutable_timestamp()->set_seconds(static_cast<std::int64_t>(ns / kSecond));
+  message.mutable_timestamp()->set_nanos(static_cast<std::int32_t>(ns % kSecond));
+}
+
+template <typename Message>
+void stamp(Message& message, std::uint64_t ns, const std::string& frame_id) {
+  stamp(message, ns);
+  message.set_frame_id(frame_id);
+}
+
+/// The position and orientation of the object: metres, and a unit quaternion.
+void fill(const v1::ObjectPose& pose, foxglove::Vector3& position, foxglove::Quaternion& turn) {
+  position.set_x(1e-3 * pose.translation_mm().x());
+  position.set_y(1e-3 * pose.translation_mm().y());
+  position.set_z(1e-3 * pose.translation_mm().z());
+  const v1::Vector3& axis = pose.rotation_deg();
+  const double degrees = std::hypot(axis.x(), axis.y(), axis.z());
+  const double half = 0.5 * degrees * std::numbers::pi / 180;
+  const double scale = degrees > 0 ? std::sin(half) / degrees : 0;
+  turn.set_x(scale * axis.x());
+  turn.set_y(scale * axis.y());
+  turn.set_z(scale * axis.z());
+  turn.set_w(std::cos(half));
 }
 
 /// Micrometres, 0 where less or not to be believed.
@@ -86,8 +107,9 @@ foxglove::PointCloud point_cloud(const v1::Frame& frame, std::uint64_t time_ns) 
   constexpr std::size_t kStride = kPointParts.size() * sizeof(float);
   const std::size_t size = std::size_t{cloud.width()} * cloud.height();
   // Divided, as the product of what the daemon says may not fit 64 bits.
-  if (cloud.encoding() != v1::CLOUD_FLOAT32 || cloud.data().size() % kStride != 0 ||
-      cloud.data().size() / kStride != size || cloud.points() > size) {
+  const bool known = !frame.has_cloud() || cloud.encoding() == v1::CLOUD_FLOAT32;
+  if (!known || cloud.data().size() % kStride != 0 || cloud.data().size() / kStride != size ||
+      cloud.points() > size) {
     throw client::ProtocolError("a cloud of points is damaged: update dtact-perceive or dtact-web");
   }
   foxglove::PointCloud out;
@@ -112,6 +134,24 @@ foxglove::PointCloud point_cloud(const v1::Frame& frame, std::uint64_t time_ns) 
       data.append(reinterpret_cast<const char*>(&value), sizeof value);
     }
   }
+  return out;
+}
+
+foxglove::PoseInFrame pose_in_frame(const v1::Frame& frame, std::uint64_t time_ns) {
+  foxglove::PoseInFrame out;
+  stamp(out, time_ns, frame.frame_id());
+  fill(frame.pose(), *out.mutable_pose()->mutable_position(),
+       *out.mutable_pose()->mutable_orientation());
+  return out;
+}
+
+foxglove::FrameTransforms transforms(const v1::Frame& frame, std::uint64_t time_ns) {
+  foxglove::FrameTransforms out;
+  foxglove::FrameTransform& one = *out.add_transforms();
+  stamp(one, time_ns);
+  one.set_parent_frame_id(frame.frame_id());
+  one.set_child_frame_id(frame.frame_id() + "_object");
+  fill(frame.pose(), *one.mutable_translation(), *one.mutable_rotation());
   return out;
 }
 

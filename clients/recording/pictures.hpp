@@ -24,9 +24,14 @@ namespace dtact::recording {
 /// The luma as mono8.
 [[nodiscard]] foxglove::RawImage luma_picture(const v1::Frame& frame, std::uint64_t time_ns);
 
+/// The object's pose in the surface frame. `pose` of the frame must be valid.
+[[nodiscard]] foxglove::PoseInFrame pose_in_frame(const v1::Frame& frame, std::uint64_t time_ns);
+/// The same as the transform of a frame of the object, named after the surface's with "_object".
+[[nodiscard]] foxglove::FrameTransforms transforms(const v1::Frame& frame, std::uint64_t time_ns);
+
 /// The valid points in the surface frame, metres, with their normals: float32 x, y, z, normal_x,
-/// normal_y, normal_z. The cloud must be CLOUD_FLOAT32; throws client::ProtocolError for any other
-/// and for a damaged one.
+/// normal_y, normal_z. Without a cloud, no points. The cloud must be CLOUD_FLOAT32; throws
+/// client::ProtocolError for any other and for a damaged one.
 [[nodiscard]] foxglove::PointCloud point_cloud(const v1::Frame& frame, std::uint64_t time_ns);
 
 }  // namespace dtact::recording

@@ -51,22 +51,41 @@ void RecordingWriter::add(v1::Frame frame) {
     add_jpeg(frame);
     frame.clear_jpeg();
   }
-  if (frame.has_depth() && picture_interval_ns_ > 0 && frame.monotonic_ns() >= next_picture_ns_) {
-    // From the time it was due on, so that the mean rate is the one asked for; from now after a
-    // gap.
-    next_picture_ns_ = std::max(next_picture_ns_, frame.monotonic_ns() - picture_interval_ns_ + 1);
-    next_picture_ns_ += picture_interval_ns_;
-    add_picture(frame);
+  if (frame.has_depth() && picture_due(frame)) add_picture(frame);
+  add_points(frame);
+  if (frame.pose().valid()) {
+    add_message(pose_, kPoseTopic, pose_in_frame(frame, now_.log_time));
+    add_message(transforms_, kTransformsTopic, transforms(frame, now_.log_time));
   }
   if (frame.has_light()) add_light(frame.light());
   add_message(frame_, frame);
 }
 
+void RecordingWriter::add_message(std::uint16_t& channel, const char* topic,
+                                  const google::protobuf::Message& message) {
+  if (channel == 0) channel = add_channel(topic, *message.GetDescriptor());
+  add_message(channel, message);
+}
+
+bool RecordingWriter::picture_due(const v1::Frame& frame) {
+  if (picture_interval_ns_ == 0 || frame.monotonic_ns() < next_picture_ns_) return false;
+  // From the time it was due on, so that the mean rate is the one asked for; from now after a gap.
+  next_picture_ns_ = std::max(next_picture_ns_, frame.monotonic_ns() - picture_interval_ns_ + 1);
+  next_picture_ns_ += picture_interval_ns_;
+  return true;
+}
+
+/// Points for viewing; none once the contact has ended, since players show the last ones.
+void RecordingWriter::add_points(const v1::Frame& frame) {
+  const bool ended =
+      points_shown_ && !frame.has_cloud() && frame.has_contact() && !frame.contact().in_contact();
+  if (!ended && !(frame.has_cloud() && picture_due(frame))) return;
+  points_shown_ = frame.has_cloud();
+  add_message(points_, kPointsTopic, point_cloud(frame, now_.log_time));
+}
+
 void RecordingWriter::add_jpeg(const v1::Frame& frame) {
-  if (jpeg_ == 0) {
-    jpeg_ = add_channel(kCameraTopic, *foxglove::CompressedImage::descriptor());
-  }
-  add_message(jpeg_, jpeg_picture(frame, now_.log_time));
+  add_message(jpeg_, kCameraTopic, jpeg_picture(frame, now_.log_time));
 }
 
 void RecordingWriter::add_picture(const v1::Frame& frame) {

@@ -11,7 +11,7 @@ namespace dtact::recording {
 
 struct RecordingOptions {
   std::string program;      ///< Who records: "dtactctl 0.1.0".
-  double pictures_hz = 10;  ///< Depth images for viewing, per second; 0: none.
+  double pictures_hz = 10;  ///< Depth images, or point clouds, for viewing, per second; 0: none.
 };
 
 /// Writes the daemon's messages as an MCAP file (see README.md in this folder). Passes on
@@ -46,7 +46,12 @@ class RecordingWriter {
                                           const google::protobuf::Descriptor& type,
                                           const std::map<std::string, std::string>& metadata = {});
   void add_message(std::uint16_t channel, const google::protobuf::Message& message);
+  /// Writes to a channel that is made when it is first needed.
+  void add_message(std::uint16_t& channel, const char* topic,
+                   const google::protobuf::Message& message);
+  [[nodiscard]] bool picture_due(const v1::Frame& frame);
   void add_picture(const v1::Frame& frame);
+  void add_points(const v1::Frame& frame);
   void add_jpeg(const v1::Frame& frame);
   void add_light(const v1::LightState& light);
 
@@ -58,6 +63,10 @@ class RecordingWriter {
   std::uint16_t status_;
   std::uint16_t jpeg_ = 0;
   std::uint16_t picture_ = 0;
+  std::uint16_t points_ = 0;
+  std::uint16_t pose_ = 0;
+  std::uint16_t transforms_ = 0;
+  bool points_shown_ = false;  ///< The last points were some.
   /// Wall time of CLOCK_MONOTONIC's zero, at the first frame or event.
   std::optional<std::int64_t> epoch_ns_;
   Moment now_;

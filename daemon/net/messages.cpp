@@ -180,6 +180,7 @@ void fill(const hal::Light& light, std::optional<std::int64_t> since_ns, v1::Lig
 
 void fill(const pipeline::ContactSummary& contact, v1::Contact& out) {
   out.set_in_contact(contact.in_contact);
+  out.set_threshold_mm(contact.threshold_mm);
   out.set_area_mm2(contact.area_mm2);
   out.set_x_mm(contact.x_mm);
   out.set_y_mm(contact.y_mm);

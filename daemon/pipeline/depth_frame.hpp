@@ -27,8 +27,9 @@ struct StageTimes {
 /// The contact, in the depth map's coordinates (origin at its centre, x right, y down).
 struct ContactSummary {
   bool in_contact = false;
-  double area_mm2 = 0;  ///< Area pressed deeper than the contact threshold.
-  double x_mm = 0;      ///< Depth-weighted centroid of that area.
+  double threshold_mm = 0;  ///< The contact threshold.
+  double area_mm2 = 0;      ///< Area pressed deeper than it.
+  double x_mm = 0;          ///< Depth-weighted centroid of that area.
   double y_mm = 0;
   double deepest_mm = 0;  ///< Greatest indentation.
   double deepest_x_mm = 0;

@@ -54,7 +54,8 @@ FILES = {
         /usr/share/zsh/vendor-completions/_dtact-web
         /usr/share/zsh/vendor-completions/_dtactctl
         /usr/share/dtact/foxglove-layout.json
-        /usr/share/dtact/foxglove/dtact-live.json""",
+        /usr/share/dtact/foxglove/dtact-live.json
+        /usr/share/dtact/foxglove/dtact-points.json""",
     "libdtact1": """
         LIB/libdtact.so.1""",
     "libdtact-dev": """

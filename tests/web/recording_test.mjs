@@ -114,6 +114,11 @@ test("what is recorded is what the daemon sent", async () => {
     sequencesOf(file, "/camera/jpeg"),
     frames.map(({ sequence }) => sequence),
   );
+  // Ten pictures a second for viewing, of frames with depth.
+  const pictures = sequencesOf(file, "/dtact/depth");
+  const withDepth = frames.filter(({ map }) => map !== "").map(({ sequence }) => sequence);
+  assert.ok(pictures.length > 10 && pictures.length < withDepth.length, `${pictures.length} pictures`);
+  assert.ok(pictures.every((sequence) => withDepth.includes(sequence)));
   const both = sent.flatMap((other) => {
     const frame = frames.find(({ sequence, map }) => sequence === other.sequence && map !== "");
     return frame ? [[frame, other]] : [];

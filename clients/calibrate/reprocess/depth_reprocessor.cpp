@@ -126,6 +126,7 @@ void DepthReprocessor::describe(const recon::DepthSums& sums, const pipeline::Re
   frame.mutable_depth()->set_uncertainty_um(uncertainty_um);
   auto& contact = *frame.mutable_contact();
   contact.set_in_contact(summary_.in_contact);
+  contact.set_threshold_mm(summary_.threshold_mm);
   contact.set_area_mm2(summary_.area_mm2);
   contact.set_x_mm(summary_.x_mm);
   contact.set_y_mm(summary_.y_mm);

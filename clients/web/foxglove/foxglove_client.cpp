@@ -16,7 +16,6 @@ using boost::system::error_code;
 
 namespace {
 
-constexpr int kInfo = 0;
 constexpr int kWarning = 1;
 constexpr int kError = 2;
 
@@ -42,7 +41,7 @@ void FoxgloveClient::start() {
   for (const Mount& place : mounts_) {
     const Source& source = place.sensor->source();
     if (!source.connected()) {
-      send(status(kWarning, fmt::format("the daemon of {} is away", source.name())));
+      send(status(kWarning, fmt::format("the daemon of {} is away", source.name()), source.name()));
     }
   }
   read();
@@ -178,9 +177,10 @@ void FoxgloveClient::on_message(const SensorTopics& sensor, Topic topic,
   if (!writing_) write_next();
 }
 
-void FoxgloveClient::on_state(bool well, const std::string& sentence) {
+void FoxgloveClient::on_state(const SensorTopics& sensor, bool well, const std::string& sentence) {
   advertise_channels();
-  send(status(well ? kInfo : kWarning, sentence));
+  const std::string& name = sensor.source().name();
+  send(well ? remove_status(name) : status(kWarning, sentence, name));
 }
 
 void FoxgloveClient::send(std::string bytes, bool text) {

@@ -45,7 +45,7 @@ class FoxgloveClient : public SensorTopics::Listener,
 
   void on_message(const SensorTopics& sensor, Topic topic,
                   const std::shared_ptr<const Message>& message) override;
-  void on_state(bool well, const std::string& sentence) override;
+  void on_state(const SensorTopics& sensor, bool well, const std::string& sentence) override;
 
  private:
   struct Subscription {

@@ -86,7 +86,7 @@ const google::protobuf::ListValue& list_of(const google::protobuf::Struct& objec
                                         : found->second.list_value();
 }
 
-std::string schema_part(const char* type, const char* schema) {
+std::string schema_part(const std::string& type, const char* schema) {
   return fmt::format(
       R"({{"encoding":"json","schemaName":{},"schemaEncoding":"jsonschema","schema":{}}})",
       cli::json_string(type), cli::json_string(schema));
@@ -137,15 +137,21 @@ std::string advertise_services(const std::vector<std::string>& prefixes) {
           fmt::format(R"({{"id":{},"name":{},"type":{},"request":{},"response":{}}})",
                       service_id(sensor, static_cast<Service>(i)),
                       cli::json_string(prefixes[sensor] + info.name), cli::json_string(info.type),
-                      schema_part(info.type, info.request), schema_part(info.type, info.response));
+                      schema_part(std::string(info.type) + "_Request", info.request),
+                      schema_part(std::string(info.type) + "_Response", info.response));
     }
   }
   return fmt::format(R"({{"op":"advertiseServices","services":[{}]}})", all);
 }
 
-std::string status(int level, std::string_view sentence) {
-  return fmt::format(R"({{"op":"status","level":{},"message":{}}})", level,
-                     cli::json_string(sentence));
+std::string status(int level, std::string_view sentence, std::string_view id) {
+  const std::string named = id.empty() ? "" : fmt::format(R"(,"id":{})", cli::json_string(id));
+  return fmt::format(R"({{"op":"status","level":{},"message":{}{}}})", level,
+                     cli::json_string(sentence), named);
+}
+
+std::string remove_status(std::string_view id) {
+  return fmt::format(R"({{"op":"removeStatus","statusIds":[{}]}})", cli::json_string(id));
 }
 
 std::string service_failure(std::uint32_t service, std::uint32_t call, std::string_view sentence) {

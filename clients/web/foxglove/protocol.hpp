@@ -44,8 +44,10 @@ struct Channels {
 [[nodiscard]] std::string advertise(const std::vector<Channels>& all);
 [[nodiscard]] std::string unadvertise(const std::vector<Channels>& all);
 [[nodiscard]] std::string advertise_services(const std::vector<std::string>& prefixes);
-/// `level`: 0 information, 1 warning, 2 error.
-[[nodiscard]] std::string status(int level, std::string_view sentence);
+/// `level`: 0 information, 1 warning, 2 error. One of the same `id` replaces the one before.
+[[nodiscard]] std::string status(int level, std::string_view sentence, std::string_view id = "");
+/// Withdraws the status of this id.
+[[nodiscard]] std::string remove_status(std::string_view id);
 [[nodiscard]] std::string service_failure(std::uint32_t service, std::uint32_t call,
                                           std::string_view sentence);
 /// Binary.

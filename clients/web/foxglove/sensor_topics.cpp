@@ -59,13 +59,13 @@ void SensorTopics::on_changed() {
   light_.reset();
   const bool well = source_->connected();
   publish_state(
-      well, well ? fmt::format("the daemon of {} is there", source_->name())
-                 : fmt::format("the daemon of {} is away: {}", source_->name(), source_->reason()));
+      well,
+      well ? "" : fmt::format("the daemon of {} is away: {}", source_->name(), source_->reason()));
   update();
 }
 
 void SensorTopics::publish_state(bool well, const std::string& sentence) {
-  for (const auto& [listener, topics] : listeners_) listener->on_state(well, sentence);
+  for (const auto& [listener, topics] : listeners_) listener->on_state(*this, well, sentence);
 }
 
 void SensorTopics::publish(Topic topic, const std::shared_ptr<const Message>& message) {
@@ -94,11 +94,22 @@ void SensorTopics::on_frame(const RelayedFrame& relayed) {
       publish_state(false, e.what());
     }
   }
+  if (wanted.test(index(Topic::points))) clear_points(frame);
   // Each light once.
   const auto light = message_of(Topic::light, frame);
   if (light == nullptr || (light_ != nullptr && light_->payload == light->payload)) return;
   light_ = light;
   publish(Topic::light, light_);
+}
+
+/// The points of a contact that has ended would stay on the screen.
+void SensorTopics::clear_points(const v1::Frame& frame) {
+  if (frame.has_cloud()) {
+    points_shown_ = true;
+  } else if (points_shown_ && frame.has_contact() && !frame.contact().in_contact()) {
+    points_shown_ = false;
+    publish(Topic::points, no_points(frame));
+  }
 }
 
 }  // namespace dtact::web::foxglove

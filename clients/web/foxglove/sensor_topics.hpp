@@ -23,8 +23,8 @@ class SensorTopics {
 
     virtual void on_message(const SensorTopics& sensor, Topic topic,
                             const std::shared_ptr<const Message>& message) = 0;
-    /// A sentence on why nothing comes, or that it does again.
-    virtual void on_state(bool well, const std::string& sentence) = 0;
+    /// A sentence on why nothing comes; empty when it does again.
+    virtual void on_state(const SensorTopics& sensor, bool well, const std::string& sentence) = 0;
   };
 
   explicit SensorTopics(std::shared_ptr<Source> source);
@@ -43,6 +43,7 @@ class SensorTopics {
   void on_changed();
   void on_event(const v1::Event& event);
   void on_frame(const RelayedFrame& frame);
+  void clear_points(const v1::Frame& frame);
   void publish(Topic topic, const std::shared_ptr<const Message>& message);
   void publish_state(bool well, const std::string& sentence);
   void update();
@@ -52,6 +53,7 @@ class SensorTopics {
   std::map<Listener*, Topics> listeners_;
   std::string asked_;  ///< The Subscribe that the daemon knows, serialized.
   std::shared_ptr<const Message> light_;
+  bool points_shown_ = false;  ///< The last points were some.
 };
 
 }  // namespace dtact::web::foxglove

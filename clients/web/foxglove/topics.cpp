@@ -37,7 +37,9 @@ const std::array<TopicInfo, kTopics>& topics() {
       {Topic::depth, recording::kDepthTopic, ::foxglove::RawImage::descriptor()},
       {Topic::luma, "/camera/luma", ::foxglove::RawImage::descriptor()},
       {Topic::jpeg, recording::kCameraTopic, ::foxglove::CompressedImage::descriptor()},
-      {Topic::points, "/dtact/points", ::foxglove::PointCloud::descriptor()},
+      {Topic::points, recording::kPointsTopic, ::foxglove::PointCloud::descriptor()},
+      {Topic::pose, recording::kPoseTopic, ::foxglove::PoseInFrame::descriptor()},
+      {Topic::transforms, recording::kTransformsTopic, ::foxglove::FrameTransforms::descriptor()},
   }};
   return all;
 }
@@ -45,12 +47,17 @@ const std::array<TopicInfo, kTopics>& topics() {
 Topics served_by(const std::optional<v1::HelloReply>& daemon) {
   Topics served;
   if (daemon && std::ranges::count(daemon->features(), "cloud") > 0) {
-    for (const Topic topic : {Topic::summary, Topic::contact, Topic::points}) {
+    for (const Topic topic :
+         {Topic::summary, Topic::contact, Topic::points, Topic::pose, Topic::transforms}) {
       served.set(index(topic));
     }
     return served;
   }
-  return served.set().reset(index(Topic::points));
+  served.set();
+  for (const Topic topic : {Topic::points, Topic::pose, Topic::transforms}) {
+    served.reset(index(topic));
+  }
+  return served;
 }
 
 v1::Subscribe subscription_for(Topics wanted) {
@@ -77,8 +84,13 @@ v1::Subscribe subscription_for(Topics wanted) {
     request.set_contact_box(true);
     request.set_decimation(2);
   }
-  if (wants(Topic::frame) || wants(Topic::summary) || wants(Topic::contact) ||
-      wants(Topic::light)) {
+  if (wants(Topic::pose) || wants(Topic::transforms)) {
+    request.set_pose(true);
+    request.set_pose_hz(kMaxHz);
+  }
+  // Points also with the frame in which the contact has ended.
+  if (wants(Topic::points) || wants(Topic::frame) || wants(Topic::summary) ||
+      wants(Topic::contact) || wants(Topic::light)) {
     request.set_summary(true);
     request.set_summary_hz(kMaxHz);
   }
@@ -102,12 +114,25 @@ std::shared_ptr<const Message> message_of(Topic topic, const v1::Frame& frame) {
       return frame.has_jpeg() ? made(frame, recording::jpeg_picture(frame, time_ns)) : nullptr;
     case Topic::points:
       return frame.has_cloud() ? made(frame, recording::point_cloud(frame, time_ns)) : nullptr;
+    case Topic::pose:
+      return frame.pose().valid() ? made(frame, recording::pose_in_frame(frame, time_ns)) : nullptr;
+    case Topic::transforms:
+      return frame.pose().valid() ? made(frame, recording::transforms(frame, time_ns)) : nullptr;
     case Topic::light:
       return frame.has_light() ? made(frame, frame.light()) : nullptr;
     case Topic::event:
       return nullptr;
   }
   return nullptr;
+}
+
+std::shared_ptr<const Message> no_points(const v1::Frame& frame) {
+  v1::Frame plain;
+  plain.set_wall_ns(frame.wall_ns());
+  plain.set_frame_id(frame.frame_id());
+  return made(plain,
+              recording::point_cloud(
+                  plain, static_cast<std::uint64_t>(std::max<std::int64_t>(0, frame.wall_ns()))));
 }
 
 }  // namespace dtact::web::foxglove

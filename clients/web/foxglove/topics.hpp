@@ -24,9 +24,11 @@ enum class Topic : std::uint8_t {
   depth,
   luma,
   jpeg,
-  points
+  points,
+  pose,
+  transforms
 };
-inline constexpr std::size_t kTopics = 9;
+inline constexpr std::size_t kTopics = 11;
 using Topics = std::bitset<kTopics>;
 
 struct TopicInfo {
@@ -42,8 +44,8 @@ inline constexpr std::size_t index(Topic topic) { return static_cast<std::size_t
 /// Frames a second of each channel, at most.
 inline constexpr double kMaxHz = 60;
 
-/// What a daemon has messages of: dtactd maps and pictures, dtact-perceive points. None: one that
-/// was never there, which is taken for dtactd.
+/// What a daemon has messages of: dtactd maps and pictures, dtact-perceive points and poses. None:
+/// one that was never there, which is taken for dtactd.
 [[nodiscard]] Topics served_by(const std::optional<v1::HelloReply>& daemon);
 
 /// What the daemon has to send for these; nothing at all where events are enough.
@@ -58,5 +60,7 @@ struct Message {
 /// `frame` as a topic's message; null when it has nothing of that. Light and events are none of a
 /// frame's own. Throws client::ProtocolError for a damaged map.
 [[nodiscard]] std::shared_ptr<const Message> message_of(Topic topic, const v1::Frame& frame);
+/// A cloud without points: viewers show the last one until the next.
+[[nodiscard]] std::shared_ptr<const Message> no_points(const v1::Frame& frame);
 
 }  // namespace dtact::web::foxglove

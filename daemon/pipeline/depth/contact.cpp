@@ -30,6 +30,7 @@ ContactSummary ContactDetector::inspect(const recon::DepthSums& sums, int width,
   const double centre_y = 0.5 * (height - 1);
   ContactSummary summary;
   summary.in_contact = in_contact_;
+  summary.threshold_mm = rules_.threshold_mm;
   summary.area_mm2 = static_cast<double>(sums.made) * px_mm2;
   if (sums.um > 0) {
     const auto weight = static_cast<double>(sums.um);

@@ -7,6 +7,7 @@ import json
 import os
 import pathlib
 import re
+import runpy
 import subprocess
 import sys
 import threading
@@ -87,6 +88,9 @@ class Depth(unittest.TestCase):
             # The ball's deepest point, from the daemon's summary and from the map.
             self.assertAlmostEqual(float(np.nanmax(f.depth_mm)), f.contact.deepest_mm, delta=0.1)
             self.assertGreater(f.contact.area_mm2, 0.5)
+            # At full resolution the mask is what the daemon summed over.
+            self.assertAlmostEqual(float(f.contact_mask.sum()) * f.mm_per_px**2, f.contact.area_mm2,
+                                   delta=1e-6)
             self.assertTrue(0 < f.uncertainty_mm < 0.2, f.uncertainty_mm)
             self.assertAlmostEqual(f.mm_per_px, 0.0413793, places=6)
             self.assertEqual(f.light.brightness, 255)
@@ -260,6 +264,32 @@ class Documents(unittest.TestCase):
         drawing = mock.MagicMock()  # matplotlib is not needed to see that the code runs.
         with mock.patch.dict(sys.modules, {"matplotlib": drawing, "matplotlib.pyplot": drawing}):
             self.assertRegex(self.run_code(cells), r"mm deep on [\d.]+ mm²")
+
+
+    def test_drawing(self):
+        drawing = mock.MagicMock()
+        program = SOURCE / "clients/python/docs/draw_contact.py"
+        with mock.patch.dict(sys.modules, {"matplotlib": drawing, "matplotlib.pyplot": drawing.pyplot}), \
+                mock.patch.object(sys, "argv", [str(program), daemon.address, "--frames", "3"]), \
+                contextlib.redirect_stdout(io.StringIO()) as out:
+            runpy.run_path(str(program), run_name="__main__")
+        self.assertRegex(out.getvalue(), r"^drew 3 frames, the last \d\.\d\d mm deep\n$")
+        pictures = [call.args[0].shape for call in
+                    drawing.pyplot.figure.return_value.add_subplot.return_value.imshow.mock_calls]
+        self.assertEqual(pictures, [(400, 500)] * 6)
+
+    def test_9dtacts_mixed_image(self):
+        page = (SOURCE / "clients/python/docs/9dtact.md").read_text()
+        made = re.search(r"`d = (f\.luma - r)`, then `(np\.stack.*?)`", page)
+        with dtact.connect(daemon.address) as s:
+            s.subscribe(dtact.Subscription(depth=None, luma=True))
+            f = next(f for f in s.frames() if f.has_luma)
+            self.assertTrue(s.reference().png.startswith(b"\x89PNG"))
+        r = np.full(f.luma.shape, 100.0)  # Decoding the PNG is OpenCV's part.
+        names = {"np": np, "f": f, "r": r, "d": eval(made[1], {"f": f, "r": r})}
+        mixed = eval(made[2], names)
+        self.assertEqual(mixed.shape, (600, 800, 3))
+        self.assertTrue(((mixed[..., 1] > 0) == (f.luma > 100)).all())
 
 
 class Bench(unittest.TestCase):

@@ -54,6 +54,35 @@ class Perceive(unittest.TestCase):
         self.assertGreater(f.pose.points, 100)
         np.testing.assert_allclose(np.linalg.det(f.pose.matrix()), 1, atol=1e-9)
 
+    def test_points_without_it_are_the_same(self):
+        """The Python package's own points of a flat gel, of the same frame."""
+        with dtact.connect(self.address) as s, \
+                dtact.connect(self.daemon.address, kept_frames=200) as whole:
+            whole.subscribe()
+            s.subscribe(dtact.Subscription(depth=None, cloud="float32"))
+            until = time.monotonic() + 60
+            depths = {}
+            for f in s.frames():
+                while isinstance(one := whole.next(0), dtact.Frame):
+                    depths[one.sequence] = one
+                if f.has_cloud and f.contact.deepest_mm > 0.3 and f.sequence in depths:
+                    break
+                self.assertLess(time.monotonic(), until, "no frame came from both within a minute")
+        made, cloud = depths[f.sequence].points(), f.cloud
+        self.assertEqual((made.points.shape, made.decimation), (cloud.points.shape, cloud.decimation))
+        np.testing.assert_array_equal(made.valid, cloud.valid)
+        np.testing.assert_allclose(made.points, cloud.points, atol=1e-8)
+        np.testing.assert_allclose(made.normals, cloud.normals, atol=1e-5)
+
+    def test_a_recording_holds_points_and_poses(self):
+        file = self.daemon.folder / "points.mcap"
+        subprocess.run([os.environ["DTACTCTL"], "--host", self.address, "record", "-o", file, "--seconds",
+                        "8"], check=True, capture_output=True)
+        frames = [item for item in dtact.read(file) if isinstance(item, dtact.Frame)]
+        self.assertTrue(any(f.has_cloud for f in frames))
+        self.assertTrue(any(f.pose and f.pose.valid for f in frames))
+        self.assertFalse(any(f.has_depth for f in frames))
+
     def test_whole_maps_are_not_to_be_had(self):
         with dtact.connect(self.address) as s:
             with self.assertRaises(dtact.Refused):

@@ -32,7 +32,8 @@ TOPICS = {"/dtact/frame": "dtact.v1.Frame", "/dtact/summary": "dtact.v1.Frame",
           "/dtact/event": "dtact.v1.Event", "/dtact/depth": "foxglove.RawImage",
           "/camera/luma": "foxglove.RawImage", "/camera/jpeg": "foxglove.CompressedImage"}
 POINTS = {"/dtact/summary": "dtact.v1.Frame", "/dtact/contact": "dtact.v1.Contact",
-          "/dtact/points": "foxglove.PointCloud"}
+          "/dtact/points": "foxglove.PointCloud", "/dtact/pose": "foxglove.PoseInFrame",
+          "/tf": "foxglove.FrameTransforms"}
 daemon: Daemon
 perceive: Perceive
 gateway: Gateway
@@ -189,7 +190,10 @@ class FoxglovesClient(unittest.TestCase):
         self.assertEqual([(entry["service"]["name"], entry["service"]["type"]) for entry in node["service"]],
                          [("/dtact/set_light", "dtact.v1.SetLight"), ("/dtact/rezero", "dtact.v1.Rezero")])
         for entry in node["service"]:
-            json.loads(entry["service"]["request"]["schema"])
+            for side in ("request", "response"):
+                json.loads(entry["service"][side]["schema"])
+                self.assertEqual(entry["service"][side]["schemaName"],
+                                 f"{entry['service']['type']}_{side.capitalize()}")
         (answer,) = node["answer"]
         self.assertEqual((answer["encoding"], json.loads(answer["text"])["brightness"]), ("json", 200))
         failures = sorted(entry["message"] for entry in node["failure"])
@@ -218,6 +222,8 @@ class FoxglovesClient(unittest.TestCase):
             self.assertEqual(cloud.point_stride, 24)
             self.assertEqual([field.name for field in cloud.fields][:3], ["x", "y", "z"])
             points = numpy.frombuffer(cloud.data, "<f4").reshape(-1, 6)
+            if len(points) == 0:
+                continue  # The contact has ended.
             self.assertTrue(numpy.isfinite(points).all())
             if time_ns in came["/dtact/contact"]:
                 deepest_mm = came["/dtact/contact"][time_ns].deepest_mm

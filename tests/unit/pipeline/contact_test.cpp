@@ -52,6 +52,7 @@ TEST_F(ContactTest, SummaryIsInMillimetresFromTheCentre) {
   map[7 * kSide + 8] = 300;  // 3 px right, 2 px down
   map[7 * kSide + 9] = 900;  // 4 px right, 2 px down
   const ContactSummary summary = summarise();
+  EXPECT_DOUBLE_EQ(summary.threshold_mm, 0.10);
   EXPECT_DOUBLE_EQ(summary.area_mm2, 0.5);
   EXPECT_DOUBLE_EQ(summary.x_mm, 1.875);  // (1.5·300 + 2.0·900) / 1200
   EXPECT_DOUBLE_EQ(summary.y_mm, 1.0);

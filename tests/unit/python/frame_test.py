@@ -53,6 +53,68 @@ class Depth(unittest.TestCase):
         self.assertRaises(dtact.NotInFrame, getattr, f, "jpeg")
 
 
+class MadeOfTheDepth(unittest.TestCase):
+    """On a map of 4 × 3 pixels of 0.0417 mm, one of them untrusted."""
+
+    VALUES = (0, 100, 101, 300,
+              0, -20, 200, -32768,
+              10, 0, 0, 500)
+
+    def frame(self, in_contact=True, mm_per_px=0.0417):
+        message = frame(1, values=self.VALUES, width=4).frame
+        message.depth.mm_per_px = mm_per_px
+        message.contact.in_contact, message.contact.threshold_mm = in_contact, 0.1
+        return dtact.Frame(message)
+
+    def test_contact_mask(self):
+        f = self.frame()
+        self.assertEqual(f.contact_mask.astype(int).tolist(),
+                         [[0, 0, 1, 1], [0, 0, 1, 0], [0, 0, 0, 1]])
+        self.assertEqual((f.contact_mask.dtype, f.contact.threshold_mm), (bool, 0.1))
+        self.assertFalse(self.frame(in_contact=False).contact_mask.any())
+        unmeasured = frame(1).frame
+        unmeasured.contact_absence = 2
+        with self.assertRaisesRegex(dtact.NotInFrame, "frame 1 was not measured: referencing"):
+            dtact.Frame(unmeasured).contact_mask
+
+    def test_gradients(self):
+        g = self.frame().gradients
+        self.assertEqual((g.shape, g.dtype), ((3, 4, 2), np.float32))
+        # Between the neighbours on both sides: 101 − 0 and 200 − 100 µm on two pixels of 41.7 µm.
+        np.testing.assert_allclose(g[0, 1, 0], 101 / (2 * 41.7), rtol=1e-5)
+        np.testing.assert_allclose(g[1, 2, 1], -101 / (2 * 41.7), rtol=1e-5)
+        np.testing.assert_allclose(g[0, 0], [100 / 41.7, 0], rtol=1e-5)  # One-sided at the edge.
+        self.assertTrue(np.isnan(g[1, 3]).any() and np.isnan(g[1, 2, 0]))
+        line = dtact.Frame(frame(1, values=(0, 5, 10), width=3).frame).gradients
+        self.assertEqual(line[:, :, 0].tolist(), [[np.float32(0.01)] * 3])
+        self.assertTrue(np.isnan(line[:, :, 1]).all())
+
+    def test_points_are_a_plane_pressed_in(self):
+        f = self.frame(mm_per_px=0.2)  # A reach of one pixel.
+        cloud = f.points()
+        self.assertEqual((cloud.points.shape, cloud.points.dtype), ((3, 4, 3), np.float32))
+        np.testing.assert_allclose(cloud.points[0, 2], [0.5 * 2e-4, -2e-4, -101e-6], rtol=1e-5)
+        self.assertFalse(cloud.valid[1, 3])
+        expected = np.array([100 / 400, -20 / 400, 1])  # Rise to the right, fall downwards, of 0.4 mm.
+        f = dtact.Frame(frame(1, values=(0, 50, 100, 0, 40, 0, 0, 30, 0), width=3).frame)
+        f.message.depth.mm_per_px = 0.2
+        np.testing.assert_allclose(f.points().normals[1, 1],
+                                   [0, -20 / 400, 1] / np.linalg.norm([0, -20 / 400, 1]), rtol=1e-5)
+        np.testing.assert_allclose(f.points().normals[0, 1][0] / f.points().normals[0, 1][2],
+                                   expected[0], rtol=1e-5)
+
+    def test_points_without_two_neighbours_are_left_out(self):
+        values = [-32768] * 9
+        values[4] = 7
+        self.assertFalse(dtact.Frame(frame(1, values=values, width=3).frame).points().valid.any())
+
+    def test_points_of_a_curved_gel(self):
+        f = self.frame()
+        f.message.surface.shape = 1
+        with self.assertRaisesRegex(dtact.NotInFrame, "is a sphere: connect to dtact-perceive"):
+            f.points()
+
+
 class Else(unittest.TestCase):
     def test_times(self):
         f = dtact.Frame(frame(7).frame)

@@ -50,6 +50,46 @@ class RecordingFile : public testing::Test {
   }
 };
 
+TEST_F(RecordingFile, HasPointsAndPosesForViewing) {
+  const auto frame_at = [](std::uint64_t number) {
+    v1::Frame frame;
+    frame.set_sequence(number);
+    frame.set_monotonic_ns(static_cast<std::int64_t>(1'000'000'000 + number * 16'000'000));
+    frame.set_wall_ns(frame.monotonic_ns());
+    frame.set_frame_id("dtact_surface");
+    frame.mutable_contact()->set_in_contact(number < 3);
+    return frame;
+  };
+  RecordingWriter writer(sink_, {.program = "test", .pictures_hz = 10});
+  for (std::uint64_t number = 0; number < 6; ++number) {
+    v1::Frame frame = frame_at(number);
+    if (number < 3) {
+      auto& cloud = *frame.mutable_cloud();
+      cloud.set_encoding(v1::CLOUD_FLOAT32);
+      cloud.set_width(1);
+      cloud.set_height(1);
+      cloud.set_points(1);
+      cloud.set_data(std::string(24, '\0'));
+      frame.mutable_pose()->set_valid(number > 0);
+      frame.mutable_pose()->mutable_translation_mm()->set_y(2);
+    }
+    writer.add(frame);
+  }
+  writer.finish();
+  std::vector<std::size_t> points;
+  mcap::Reader(path_).read({kPointsTopic}, [&](const mcap::Channel&, const mcap::Message& m) {
+    foxglove::PointCloud cloud;
+    EXPECT_TRUE(cloud.ParseFromArray(m.data.data(), static_cast<int>(m.data.size())));
+    points.push_back(cloud.data().size());
+    return true;
+  });
+  EXPECT_THAT(points, ElementsAre(24, 0)) << "one of the contact, and none once it has ended";
+  EXPECT_THAT(rows(kPoseTopic), SizeIs(2));
+  EXPECT_THAT(rows(kTransformsTopic), SizeIs(2));
+  EXPECT_DOUBLE_EQ(first<foxglove::PoseInFrame>(kPoseTopic).pose().position().y(), 0.002);
+  EXPECT_THAT(rows(kFrameTopic), SizeIs(6));
+}
+
 TEST_F(RecordingFile, KeepsAFrameWholeAndItsJpegOnce) {
   RecordingWriter writer(sink_, {.program = "test"});
   writer.add(sample_frame(0));

@@ -85,5 +85,25 @@ TEST(FoxgloveClient, OnASlowLinkTheNewestMapWaits) {
   client->close("over");
 }
 
+TEST(FoxgloveClient, WithdrawsItsAlertWhenTheDaemonIsBack) {
+  asio::io_context io;
+  const auto socket = std::make_shared<SlowSocket>(io);
+  const auto sensor =
+      std::make_shared<SensorTopics>(std::make_shared<Source>(io, "left", client::Options{}));
+  const auto client =
+      std::make_shared<FoxgloveClient>(socket, std::vector<Mount>{{sensor, "", {}}},
+                                       net::Rights::view, "test", [](const std::string&) {});
+  client->start();
+  while (socket->finish_write()) {
+  }
+  EXPECT_EQ(socket->sent.back(),
+            R"({"op":"status","level":1,"message":"the daemon of left is away","id":"left"})");
+  client->on_state(*sensor, true, "");
+  while (socket->finish_write()) {
+  }
+  EXPECT_EQ(socket->sent.back(), R"({"op":"removeStatus","statusIds":["left"]})");
+  client->close("over");
+}
+
 }  // namespace
 }  // namespace dtact::web::foxglove

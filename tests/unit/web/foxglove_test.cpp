@@ -1,17 +1,24 @@
 // Foxglove's protocol, byte for byte.
+#include <fmt/format.h>
 #include <gmock/gmock.h>
+#include <google/protobuf/struct.pb.h>
+#include <google/protobuf/util/json_util.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cstring>
 #include <limits>
 #include <optional>
 #include <stdexcept>
+#include <string>
+#include <vector>
 
 #include "clients/cpp/errors.hpp"
 #include "clients/recording/foxglove.pb.h"
 #include "clients/web/foxglove/protocol.hpp"
 #include "clients/web/token_query.hpp"
+#include "hal/base/atomic_file.hpp"
 
 namespace dtact::web::foxglove {
 namespace {
@@ -25,6 +32,19 @@ TEST(FoxgloveProtocol, Heads) {
   EXPECT_EQ(service_failure(2, 3, "no \"x\"\n"),
             R"({"op":"serviceCallFailure","serviceId":2,"callId":3,"message":"no \"x\"\u000a"})");
   EXPECT_EQ(status(2, "a"), R"({"op":"status","level":2,"message":"a"})");
+  EXPECT_EQ(status(1, "a", "left"), R"({"op":"status","level":1,"message":"a","id":"left"})");
+  EXPECT_EQ(remove_status("left"), R"({"op":"removeStatus","statusIds":["left"]})");
+}
+
+// Two schemas of one name are an error to Foxglove.
+TEST(FoxgloveProtocol, RequestAndResponseHaveSchemasOfTheirOwn) {
+  const std::string services = advertise_services({"/left"});
+  for (const char* name : {"dtact.v1.SetLight_Request", "dtact.v1.SetLight_Response",
+                           "dtact.v1.Rezero_Request", "dtact.v1.Rezero_Response"}) {
+    const std::string quoted = fmt::format(R"("schemaName":"{}")", name);
+    EXPECT_THAT(services, testing::HasSubstr(quoted));
+    EXPECT_EQ(services.find(quoted), services.rfind(quoted)) << name;
+  }
 }
 
 TEST(FoxgloveProtocol, IdsAreAlikeForNoTwo) {
@@ -159,18 +179,98 @@ TEST(FoxgloveTopics, ACloudWhoseNumbersDoNotFitItsDataIsRefused) {
   EXPECT_THROW((void)message_of(Topic::points, frame), client::ProtocolError);
 }
 
+TEST(FoxgloveTopics, NoPointsAreACloudToo) {
+  v1::Frame frame;
+  frame.set_wall_ns(1'000'000'002);
+  frame.set_frame_id("dtact_surface");
+  EXPECT_EQ(message_of(Topic::points, frame), nullptr);
+  ::foxglove::PointCloud points;
+  ASSERT_TRUE(points.ParseFromString(no_points(frame)->payload));
+  EXPECT_EQ(points.frame_id(), "dtact_surface");
+  EXPECT_EQ(points.timestamp().nanos(), 2);
+  EXPECT_EQ(points.point_stride(), 24U);
+  EXPECT_EQ(points.fields_size(), 6);
+  EXPECT_EQ(points.data(), "");
+}
+
+TEST(FoxgloveTopics, ThePoseOfTheObject) {
+  v1::Frame frame;
+  frame.set_frame_id("dtact_surface");
+  auto& pose = *frame.mutable_pose();
+  pose.mutable_translation_mm()->set_x(1.5);
+  pose.mutable_translation_mm()->set_z(-0.5);
+  pose.mutable_rotation_deg()->set_y(-90);
+  EXPECT_EQ(message_of(Topic::pose, frame), nullptr) << "it is not known";
+  pose.set_valid(true);
+  ::foxglove::PoseInFrame in_frame;
+  ASSERT_TRUE(in_frame.ParseFromString(message_of(Topic::pose, frame)->payload));
+  EXPECT_EQ(in_frame.frame_id(), "dtact_surface");
+  EXPECT_DOUBLE_EQ(in_frame.pose().position().x(), 0.0015);
+  EXPECT_DOUBLE_EQ(in_frame.pose().position().z(), -0.0005);
+  EXPECT_NEAR(in_frame.pose().orientation().y(), -0.70710678, 1e-8);
+  EXPECT_NEAR(in_frame.pose().orientation().w(), 0.70710678, 1e-8);
+  EXPECT_EQ(in_frame.pose().orientation().x(), 0);
+  ::foxglove::FrameTransforms transforms;
+  ASSERT_TRUE(transforms.ParseFromString(message_of(Topic::transforms, frame)->payload));
+  ASSERT_EQ(transforms.transforms_size(), 1);
+  EXPECT_EQ(transforms.transforms(0).parent_frame_id(), "dtact_surface");
+  EXPECT_EQ(transforms.transforms(0).child_frame_id(), "dtact_surface_object");
+  EXPECT_NEAR(transforms.transforms(0).rotation().y(), -0.70710678, 1e-8);
+  pose.clear_rotation_deg();
+  ASSERT_TRUE(in_frame.ParseFromString(message_of(Topic::pose, frame)->payload));
+  EXPECT_EQ(in_frame.pose().orientation().w(), 1);
+}
+
+void collect_strings(const google::protobuf::Value& value, std::vector<std::string>& all) {
+  if (value.has_string_value()) all.push_back(value.string_value());
+  for (const auto& one : value.list_value().values()) collect_strings(one, all);
+  for (const auto& [key, one] : value.struct_value().fields()) {
+    all.push_back(key);
+    collect_strings(one, all);
+  }
+}
+
+TEST(FoxgloveLayouts, HaveTitlesForBothProgramsAndTopicsThatAreServed) {
+  for (const char* file :
+       {"clients/recording/foxglove-layout.json", "config/foxglove/dtact-live.json",
+        "config/foxglove/dtact-points.json"}) {
+    google::protobuf::Struct layout;
+    const std::string path = std::string(DTACT_SOURCE_DIR) + "/" + file;
+    ASSERT_TRUE(google::protobuf::util::JsonStringToMessage(base::read_file(path), &layout).ok());
+    for (const auto& [name, panel] : layout.fields().at("configById").struct_value().fields()) {
+      const auto& settings = panel.struct_value().fields();
+      EXPECT_EQ(settings.at("foxglovePanelTitle").string_value(),
+                settings.at("lichtblickPanelTitle").string_value())
+          << name;
+      std::vector<std::string> strings;
+      collect_strings(panel, strings);
+      for (const std::string& text : strings) {
+        if (!text.starts_with("/")) continue;
+        const std::string topic = text.substr(0, text.find('.'));
+        const bool service = topic == "/dtact/set_light" || topic == "/dtact/rezero";
+        EXPECT_TRUE(service || std::ranges::any_of(
+                                   topics(), [&](const TopicInfo& i) { return i.name == topic; }))
+            << file << ": " << text;
+      }
+    }
+  }
+}
+
 TEST(FoxgloveTopics, AreThoseThatTheDaemonServes) {
-  EXPECT_EQ(served_by(std::nullopt).count(), kTopics - 1);
+  EXPECT_EQ(served_by(std::nullopt).count(), kTopics - 3);
   EXPECT_FALSE(served_by(v1::HelloReply()).test(index(Topic::points)));
   v1::HelloReply perceive;
   perceive.add_features("cloud");
-  EXPECT_EQ(served_by(perceive).count(), 3U);
+  EXPECT_EQ(served_by(perceive).count(), 5U);
   EXPECT_TRUE(served_by(perceive).test(index(Topic::points)));
   Topics wanted;
   wanted.set(index(Topic::points));
   EXPECT_EQ(subscription_for(wanted).ShortDebugString(),
-            "decimation: 2 contact_box: true cloud: CLOUD_FLOAT32 cloud_hz: 60");
-  EXPECT_EQ(unadvertise({{1, "/left", wanted}}), R"({"op":"unadvertise","channelIds":[18]})");
+            "summary: true decimation: 2 contact_box: true summary_hz: 60 cloud: CLOUD_FLOAT32 "
+            "cloud_hz: 60");
+  EXPECT_EQ(unadvertise({{1, "/left", wanted}}), R"({"op":"unadvertise","channelIds":[20]})");
+  wanted.reset().set(index(Topic::transforms));
+  EXPECT_EQ(subscription_for(wanted).ShortDebugString(), "pose: true pose_hz: 60");
 }
 
 TEST(FoxgloveEndpoint, ATokenInTheAddress) {

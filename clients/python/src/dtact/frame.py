@@ -107,6 +107,39 @@ class Frame:
             )
         return self.message.depth
 
+    # ------------------------------------------------------------ made of the depth
+
+    @cached_property
+    def contact_mask(self) -> NDArray[np.bool_]:
+        """Where the object is in contact: bool (H, W), pressed deeper than `contact.threshold_mm`.
+        NotInFrame where the contact was not measured."""
+        values = self.depth_values
+        if self.contact is None:
+            raise NotInFrame(f"the contact of frame {self.sequence} was not measured: "
+                             f"{self.contact_absence}")
+        threshold_um = round(self.contact.threshold_mm * 1e3)
+        return np.asarray((values * self.um_per_unit > threshold_um)
+                          & (values != self.untrusted_value) & self.contact.in_contact)
+
+    @cached_property
+    def gradients(self) -> NDArray[np.float32]:
+        """Slope of the indentation, millimetres per millimetre: float32 (H, W, 2), along x (columns, to
+        the right) and y (rows, down). NaN beside untrusted pixels."""
+        slopes = [np.gradient(self.depth_mm, self.mm_per_px, axis=axis)
+                  if self.depth_mm.shape[axis] > 1 else np.full_like(self.depth_mm, np.nan)
+                  for axis in (1, 0)]
+        return np.asarray(np.stack(slopes, axis=-1), np.float32)
+
+    def points(self) -> PointCloud:
+        """The deformed surface as points with outward normals, like the `cloud` of dtact-perceive.
+        NotInFrame for a curved surface, whose points dtact-perceive makes."""
+        depth = self._depth
+        if self.surface.shape != "plane":
+            raise NotInFrame(f"the gel's surface is a {self.surface.shape}: connect to dtact-perceive, "
+                             "which makes its points (Subscription(cloud=...))")
+        return PointCloud.of_plane(self.depth_mm, self.mm_per_px, self.origin_px,
+                                   (depth.full_height, depth.full_width), self.decimation)
+
     # ------------------------------------------------------------ pictures
 
     @property

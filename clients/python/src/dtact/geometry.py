@@ -1,4 +1,4 @@
-"""What dtact-perceive adds to a frame: points, and the motion of the object in contact."""
+"""Points of the surface, and what dtact-perceive adds to a frame: the motion of the object in contact."""
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -12,6 +12,24 @@ from .messages import Message, name_of
 
 _PARTS = 6  # x, y, z and the normal's
 _HOLE = -32768
+_REACH_MM = 0.16  # CloudMaker::kReachMm of clients/geometry/point_cloud.hpp
+
+
+def _slope(depth: NDArray[np.float32], step: float, reach: int) -> NDArray[np.float64]:
+    """Of the indentation along the rows, between the farthest pixels on both sides that are there, at
+    most `reach` away. NaN where there is none, and where `depth` is."""
+    begin, end = np.array(depth, np.float64), np.array(depth, np.float64)
+    far = np.zeros((2, *depth.shape), int)
+    for i in range(1, min(reach, depth.shape[1] - 1) + 1):
+        left, right = ~np.isnan(depth[:, :-i]), ~np.isnan(depth[:, i:])
+        begin[:, i:][left] = depth[:, :-i][left]
+        far[0][:, i:][left] = i
+        end[:, :-i][right] = depth[:, i:][right]
+        far[1][:, :-i][right] = i
+    distance = far.sum(axis=0) * step
+    slope = np.divide(end - begin, distance, out=np.full(depth.shape, np.nan), where=distance > 0)
+    slope[np.isnan(depth)] = np.nan
+    return slope
 
 
 @dataclass(frozen=True)
@@ -61,6 +79,23 @@ class PointCloud:
             values *= np.array([m.metres_per_unit] * 3 + [1 / 32767] * 3, np.float32)
         return cls(values[..., :3], values[..., 3:], int(m.decimation) or 1,
                    m.make_ns * 1e-9)
+
+    @classmethod
+    def of_plane(cls, depth_mm: NDArray[np.float32], mm_per_px: float, origin_px: tuple[int, int],
+                 full_shape: tuple[int, int], decimation: int) -> PointCloud:
+        """Of a depth map of a flat gel: the columns and rows from `origin_px` of a map of `full_shape`.
+        Normals are taken over 0.16 mm on both sides, or to the last trusted pixel."""
+        height, width = depth_mm.shape
+        columns = origin_px[0] + np.arange(width) - 0.5 * (full_shape[1] - 1)
+        rows = origin_px[1] + np.arange(height) - 0.5 * (full_shape[0] - 1)
+        reach = max(1, round(_REACH_MM / mm_per_px))
+        slope_x = _slope(depth_mm, mm_per_px, reach)
+        slope_y = _slope(depth_mm.T, mm_per_px, reach).T
+        normals = np.stack([slope_x, slope_y, np.ones_like(slope_x)], axis=-1)
+        normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
+        points = np.stack([*np.meshgrid(columns * mm_per_px, rows * mm_per_px), -depth_mm], axis=-1)
+        points[np.isnan(normals[..., 2])] = np.nan
+        return cls((points * 1e-3).astype(np.float32), normals.astype(np.float32), decimation)
 
     @property
     def valid(self) -> NDArray[np.bool_]:

@@ -27,7 +27,7 @@ class Contact:
     """Summary of the contact."""
 
     in_contact: bool
-    area_mm2: float  #: pressed deeper than the contact threshold
+    area_mm2: float  #: pressed deeper than `threshold_mm`
     x_mm: float  #: depth-weighted centroid
     y_mm: float
     deepest_mm: float
@@ -38,6 +38,7 @@ class Contact:
     force_n: float | None = None
     force_uncertainty_n: float | None = None  #: mean absolute error to expect of it
     force_absence: str = "none"  #: "none", "uncalibrated", "beyond_calibration", "cut_off"
+    threshold_mm: float = 0.0  #: the contact threshold
 
     @property
     def force_valid(self) -> bool:
@@ -49,7 +50,7 @@ class Contact:
         force = (m.force_n, m.force_uncertainty_n) if m.HasField("force_n") else (None, None)
         return cls(m.in_contact, m.area_mm2, m.x_mm, m.y_mm, m.deepest_mm, m.deepest_x_mm,
                    m.deepest_y_mm, m.volume_mm3, *force,
-                   name_of("ForceAbsence", m.force_absence, "FORCE_ABSENCE_"))
+                   name_of("ForceAbsence", m.force_absence, "FORCE_ABSENCE_"), m.threshold_mm)
 
 
 @dataclass(frozen=True)

@@ -5,12 +5,15 @@ import type { GenFile } from "@bufbuild/protobuf/codegenv2";
 import { FileDescriptorSetSchema, TimestampSchema } from "@bufbuild/protobuf/wkt";
 import { McapWriter } from "@mcap/core";
 import { EventSchema, FrameSchema, LightStateSchema, StatusSchema } from "../../gen/dtact_pb";
-import type { Event, Frame, Status } from "../../gen/dtact_pb";
-import { CompressedImageSchema } from "../../gen/foxglove_pb";
+import type { DepthMap, Event, Frame, Status } from "../../gen/dtact_pb";
+import { CompressedImageSchema, RawImageSchema } from "../../gen/foxglove_pb";
+import { decodeDepth } from "../wire/depth";
 import { GrowingFile } from "./file";
 
 const CHUNK_BYTES = 4 * 1024 * 1024;
 const SECOND_NS = 1_000_000_000n;
+/** Between depth pictures for viewing: ten a second, as dtactctl's. */
+const PICTURE_NS = SECOND_NS / 10n;
 
 /** What describes frames beside themselves. */
 export interface Attachment {
@@ -29,6 +32,18 @@ interface Stamped {
   sequence: bigint;
   monotonicNs: bigint;
   wallNs: bigint;
+}
+
+/** Micrometres as little-endian uint16, 0 where less or untrusted. */
+function pixelsOf(map: DepthMap): Uint8Array {
+  const values = new Int16Array(map.width * map.height);
+  decodeDepth(map.encoding, map.data, map.width, map.height, values);
+  const pixels = new DataView(new ArrayBuffer(2 * values.length));
+  values.forEach((value, at) => {
+    const um = value === map.untrustedValue ? 0 : Math.round(value * map.umPerUnit);
+    pixels.setUint16(2 * at, Math.min(Math.max(um, 0), 65535), true);
+  });
+  return new Uint8Array(pixels.buffer);
 }
 
 /** A file's descriptor and those of all that it imports, these first. */
@@ -51,6 +66,7 @@ export class Recording {
   private first = 0n;
   private newest = 0n;
   private lastLight = "";
+  private pictureDueNs: bigint | undefined;
   /** These wait for the first frame. */
   private status: Status | undefined;
   private attachments: Attachment[] = [];
@@ -71,11 +87,22 @@ export class Recording {
   addFrame(frame: Frame): void {
     this.now = this.momentOf(frame);
     const { jpeg, ...rest } = frame;
+    const timestamp = create(TimestampSchema, {
+      seconds: this.now.logTime / SECOND_NS,
+      nanos: Number(this.now.logTime % SECOND_NS),
+    });
+    const { depth, frameId, monotonicNs } = frame;
+    const due = this.pictureDueNs ?? monotonicNs;
+    if (depth && monotonicNs >= due) {
+      // From the time it was due on, so that the mean rate is ten; from now after a gap.
+      const newest = monotonicNs - PICTURE_NS + 1n;
+      this.pictureDueNs = (due > newest ? due : newest) + PICTURE_NS;
+      const { width, height } = depth;
+      const size = { width, height, step: 2 * width, encoding: "16UC1" };
+      const picture = { timestamp, frameId, ...size, data: pixelsOf(depth) };
+      this.add("/dtact/depth", RawImageSchema, create(RawImageSchema, picture));
+    }
     if (jpeg) {
-      const timestamp = create(TimestampSchema, {
-        seconds: this.now.logTime / SECOND_NS,
-        nanos: Number(this.now.logTime % SECOND_NS),
-      });
       const picture = { timestamp, frameId: "dtact_camera", data: jpeg.data, format: "jpeg" };
       this.add("/camera/jpeg", CompressedImageSchema, create(CompressedImageSchema, picture));
     }
