@@ -33,6 +33,20 @@ void check_camera_files(const hal::CameraConfig& camera) {
   if (camera.backend == "replay") check_readable("camera.replay.folder", camera.replay.folder);
 }
 
+std::filesystem::path calibration_folder(const Config& config) {
+  if (!config.calibration.empty() || config.hal.camera.backend != "sim") return config.calibration;
+  // A program that is not installed has none.
+  std::error_code ignored;
+  const bool missing = config.sim_calibration == kShippedCalibration &&
+                       !std::filesystem::exists(kShippedCalibration, ignored);
+  return missing ? std::filesystem::path() : config.sim_calibration;
+}
+
+void check_calibration(const Config& config) {
+  const char* const key = config.calibration.empty() ? "camera.sim.calibration" : "calibration";
+  check_readable(key, calibration_folder(config));
+}
+
 void resolve_credentials(net::NetConfig& config) {
   config.tls_certificate = resolve_credential("net.tls_certificate", config.tls_certificate);
   config.tls_key = resolve_credential("net.tls_key", config.tls_key);

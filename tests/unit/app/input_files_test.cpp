@@ -6,6 +6,7 @@
 #include <stdexcept>
 
 #include "daemon/app/files.hpp"
+#include "hal/registry.hpp"
 
 namespace dtact::app {
 namespace {
@@ -51,6 +52,25 @@ TEST(InputFiles, OnlyTheCameraThatIsConfiguredReadsSome) {
   EXPECT_EQ(said(), "no error");
   camera.replay.folder = "/no/such/press.mcap";
   EXPECT_THAT(said(), AllOf(StartsWith("camera.replay.folder = "), Not(HasSubstr("service"))));
+}
+
+// A real camera must never show depth by the simulated sensor's calibration.
+TEST(InputFiles, OnlyTheSimulatedSensorHasACalibrationOfItsOwn) {
+  Config config;
+  EXPECT_EQ(config.sim_calibration, "/usr/share/dtactd/simulated");
+  config.sim_calibration = "/no/such/simulated";
+  for (const std::string& backend : hal::camera_backends()) {
+    config.hal.camera.backend = backend;
+    EXPECT_EQ(calibration_folder(config), backend == "sim" ? "/no/such/simulated" : "") << backend;
+    EXPECT_THAT(error([&] { check_calibration(config); }),
+                StartsWith(backend == "sim" ? "camera.sim.calibration = " : "no error"));
+  }
+  config.calibration = "/no/such/own";
+  for (const std::string& backend : hal::camera_backends()) {
+    config.hal.camera.backend = backend;
+    EXPECT_EQ(calibration_folder(config), "/no/such/own") << backend;
+    EXPECT_THAT(error([&] { check_calibration(config); }), StartsWith("calibration = "));
+  }
 }
 
 }  // namespace
