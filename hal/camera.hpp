@@ -65,8 +65,11 @@ struct CameraReport {
   /// one, or had not returned a buffer that the driver could have filled.
   std::uint64_t lost = 0;
   std::uint64_t skipped = 0;
-  std::uint64_t damaged = 0;      ///< Truncated or undecodable payloads.
-  DamageCounts damage;            ///< The same by cause.
+  std::uint64_t damaged = 0;  ///< Truncated or undecodable payloads.
+  DamageCounts damage;        ///< The same by cause.
+  /// Why the newest undecodable payload could not be decoded, without a full stop; empty when there
+  /// was none.
+  std::string damage_reason;
   std::uint64_t disconnects = 0;  ///< Times the device went away.
   /// Controls that moved by themselves within the last seconds, and were set again; empty when
   /// none.

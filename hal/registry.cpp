@@ -8,6 +8,7 @@
 #include "hal/libcamera/libcamera_camera.hpp"
 #include "hal/null/null.hpp"
 #include "hal/replay/replay_camera.hpp"
+#include "hal/sim/scene.hpp"
 #include "hal/sim/sim_camera.hpp"
 #include "hal/sim/sim_ring.hpp"
 #include "hal/v4l2/v4l2_camera.hpp"
@@ -54,6 +55,11 @@ Devices open_devices(const Config& config) {
                                          fmt::join(camera_backends(), ", ")));
   }
   return devices;
+}
+
+void check_camera(const CameraConfig& config) {
+  if (config.backend == "replay") replay::check(config);
+  if (config.backend == "sim" && !config.sim.scene.empty()) (void)sim::load_scene(config.sim.scene);
 }
 
 }  // namespace dtact::hal

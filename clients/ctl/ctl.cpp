@@ -12,6 +12,7 @@ void set_up(CLI::App& app, cli::Context& context) {
   cli::add_global_options(app, context);
   add_status(app, context);
   add_watch(app, context);
+  add_setup(app, context);
   add_bench(app, context);
   add_find(app, context);
   add_led(app, context);

@@ -9,6 +9,7 @@ namespace dtact::ctl {
 using cli::Context;
 
 void add_status(CLI::App& app, Context& context);
+void add_setup(CLI::App& app, Context& context);
 void add_watch(CLI::App& app, Context& context);
 void add_bench(CLI::App& app, Context& context);
 void add_find(CLI::App& app, Context& context);

@@ -29,9 +29,9 @@ const char* words_of(const v1::CameraControl& control) {
 }
 
 void print_camera(const v1::CameraStatus& camera, std::ostream& out) {
-  fmt::print(out, "camera       {} {}, {}x{} {} at {:g} fps, {}\n", camera.backend(),
-             camera.identity(), camera.width(), camera.height(), camera.pixel_format(),
-             camera.fps(), camera.state());
+  fmt::print(out, "camera       {} {}{}, {}x{} {} at {:g} fps, {}\n", camera.backend(),
+             camera.identity(), camera.backend() == "sim" ? " (simulated)" : "", camera.width(),
+             camera.height(), camera.pixel_format(), camera.fps(), camera.state());
   if (!camera.fix().empty()) fmt::print(out, "             {}\n", camera.fix());
   fmt::print(out, "             delivered {}, lost {}, skipped {}, damaged {}, disconnects {}\n",
              camera.delivered(), camera.lost(), camera.skipped(), camera.damaged(),

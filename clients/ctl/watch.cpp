@@ -52,7 +52,8 @@ class Watch {
       : context_(context),
         options_(options),
         terminal_(!context.json && &context.out == &std::cout && ::isatty(STDOUT_FILENO) == 1),
-        client_(context.target) {}
+        client_(context.target),
+        simulated_(client_.status().camera().backend() == "sim" ? "simulated  " : "") {}
 
   void run() {
     const cli::Interruptible while_watching;
@@ -107,7 +108,7 @@ class Watch {
   void show() {
     if (interval_.frames() > 0) {
       line(context_.json ? cli::json_line(watch_report(interval_, last_))
-                         : watch_line(interval_, last_) + '\n');
+                         : simulated_ + watch_line(interval_, last_) + '\n');
     } else {
       show_status();
     }
@@ -201,6 +202,7 @@ class Watch {
   WatchOptions options_;
   bool terminal_;
   client::Client client_;
+  std::string simulated_;         ///< Begins each line where the sensor is the simulated one.
   std::optional<Screen> screen_;  ///< Drawn on, when asked for.
   std::string below_;             ///< The line under the picture.
   std::int64_t start_ns_ = 0;

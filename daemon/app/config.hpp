@@ -17,6 +17,9 @@ namespace dtact::app {
 /// Begins the path of a file that the service manager hands in: "credential:tokens".
 inline constexpr std::string_view kCredential = "credential:";
 
+/// The simulated sensor's calibration, where the package installs it.
+inline constexpr const char* kShippedCalibration = "/usr/share/dtactd/simulated";
+
 /// Everything that can be configured. config/dtactd.toml documents every key.
 struct Config {
   Config();  ///< The defaults; the capture thread's CPU is the last one this process may use.
@@ -31,6 +34,8 @@ struct Config {
   std::string log_level = "info";   ///< "trace", "debug", "info", "warn", "error".
   /// Folder to run with as long as none that was uploaded is current; empty = none.
   std::filesystem::path calibration;
+  /// The same where `calibration` is empty and the camera is the simulated one.
+  std::filesystem::path sim_calibration = kShippedCalibration;
   /// What outlives a restart: uploaded calibrations, the last good reference. Empty = systemd's
   /// $STATE_DIRECTORY, else /var/lib/dtactd.
   std::filesystem::path state_dir;

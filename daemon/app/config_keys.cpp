@@ -82,6 +82,7 @@ std::vector<Key> bind_keys(Config& c) {
       integer("camera.sim.seed", camera.sim.seed, 0, std::numeric_limits<std::int64_t>::max(), ""),
       choice("camera.sim.output", camera.sim.output, {"luma", "yuyv", "mjpeg"}),
       boolean("camera.sim.paced", camera.sim.paced),
+      path("camera.sim.calibration", c.sim_calibration, "a folder with calibration.toml, or \"\""),
       path("camera.replay.folder", camera.replay.folder,
            "a folder with PNG or JPEG frames, or an .mcap file"),
       boolean("camera.replay.loop", camera.replay.loop),

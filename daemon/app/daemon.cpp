@@ -61,22 +61,23 @@ fs::path make_state_folder(const Config& config) {
 
 /// The calibration to start with; null when there is none, or none that can be read.
 std::shared_ptr<const calibration::Calibration> load_calibration(const fs::path& folder,
-                                                                 const fs::path& configured) {
+                                                                 const Config& config) {
   if (folder.empty()) {
     spdlog::warn(
         "no calibration: serving the camera's image only. Make one with `dtact-calibrate depth`"
         " and send it with `dtactctl calibration upload`");
     return nullptr;
   }
+  const bool is_configured = folder == calibration_folder(config);
   try {
-    if (folder == configured) check_readable("calibration", folder);
+    if (is_configured) check_calibration(config);
     auto loaded = std::make_shared<const calibration::Calibration>(calibration::load(folder));
     spdlog::info("calibration {} from {}", loaded->name, folder.string());
     return loaded;
   } catch (const std::exception& e) {
     // What the configuration names is fixed there. An uploaded one can be replaced only by a
     // daemon that runs.
-    if (folder == configured) throw;
+    if (is_configured) throw;
     spdlog::warn(
         "{}; serving the camera's image only: `dtactctl calibration list` shows the others and "
         "`dtactctl calibration activate` takes one of them",
@@ -173,8 +174,8 @@ void run_daemon(const Config& config, const std::function<Config()>& load) {
   net::NetConfig net = make_net_config(config);
   name_sensor(net.name);
   const fs::path state = make_state_folder(config);
-  net::FolderCalibrationStore store(state, config.calibration);
-  auto calibration = load_calibration(store.current(), config.calibration);
+  net::FolderCalibrationStore store(state, calibration_folder(config));
+  auto calibration = load_calibration(store.current(), config);
   const bool uncalibrated = calibration == nullptr;
 
   check_camera_files(config.hal.camera);

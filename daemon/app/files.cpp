@@ -13,6 +13,7 @@
 #include "daemon/serve/admission.hpp"
 #include "daemon/serve/security.hpp"
 #include "daemon/serve/tls.hpp"
+#include "hal/registry.hpp"
 
 namespace dtact::app {
 
@@ -31,6 +32,25 @@ void check_readable(const std::string& key, const std::filesystem::path& path) {
 void check_camera_files(const hal::CameraConfig& camera) {
   if (camera.backend == "sim") check_readable("camera.sim.scene", camera.sim.scene);
   if (camera.backend == "replay") check_readable("camera.replay.folder", camera.replay.folder);
+}
+
+void check_camera(const hal::CameraConfig& camera) {
+  check_camera_files(camera);
+  hal::check_camera(camera);
+}
+
+std::filesystem::path calibration_folder(const Config& config) {
+  if (!config.calibration.empty() || config.hal.camera.backend != "sim") return config.calibration;
+  // A program that is not installed has none.
+  std::error_code ignored;
+  const bool missing = config.sim_calibration == kShippedCalibration &&
+                       !std::filesystem::exists(kShippedCalibration, ignored);
+  return missing ? std::filesystem::path() : config.sim_calibration;
+}
+
+void check_calibration(const Config& config) {
+  const char* const key = config.calibration.empty() ? "camera.sim.calibration" : "calibration";
+  check_readable(key, calibration_folder(config));
 }
 
 void resolve_credentials(net::NetConfig& config) {

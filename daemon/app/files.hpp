@@ -14,6 +14,14 @@ void check_readable(const std::string& key, const std::filesystem::path& path);
 
 /// The same of what the camera that is configured reads: a scene, a recording.
 void check_camera_files(const hal::CameraConfig& camera);
+/// The same, and reads the scene, or the recording and its first frame. Throws with the fix.
+void check_camera(const hal::CameraConfig& camera);
+
+/// The folder of the calibration to run with as long as none that was uploaded is current: the
+/// configured one, or the simulated sensor's; empty = none.
+[[nodiscard]] std::filesystem::path calibration_folder(const Config& config);
+/// check_readable() of that folder, by the key that names it.
+void check_calibration(const Config& config);
 
 /// Puts the file that systemd handed in where certificate, key and token file are
 /// "credential:NAME". Throws as resolve_credential().

@@ -96,8 +96,13 @@ std::string detail(const pipeline::Status& status, Health health) {
                        status.camera_fps, status.camera.fps);
   }
   if (health == Health::camera_fault && status.camera_damaged) {
-    return "All that come are damaged: check its USB cable, hub and port, or set another "
-           "pixel_format or a lower camera.fps.";
+    const std::string& reason = status.camera_report.damage_reason;
+    return fmt::format("All that come are damaged{}: {}.",
+                       reason.empty() ? "" : fmt::format(" ({})", reason),
+                       status.camera.backend == "replay"
+                           ? "play a recording that is whole"
+                           : "check its USB cable, hub and port, or set another pixel_format or a "
+                             "lower camera.fps");
   }
   if (health == Health::camera_fault) return status.camera_report.fix;
   if (health == Health::camera_mismatch) return status.camera_report.moved;

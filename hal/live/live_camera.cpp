@@ -77,6 +77,7 @@ CameraReport LiveCamera::report() const {
                    get(counters_.undecodable)};
   report.damaged = report.damage.flagged + report.damage.markers + report.damage.too_short +
                    report.damage.undecodable;
+  if (const char* const reason = damage_reason_.load()) report.damage_reason = reason;
   const std::lock_guard guard(mutex_);
   report.state = state_.load();
   report.fix = fix_;
@@ -241,6 +242,7 @@ LiveCamera::Collected LiveCamera::collect(Frame& out) noexcept {
         note_delivery();
       } else {
         count_damage(status);
+        damage_reason_.store(connection_->decoder.damage());
       }
       damaged = damaged || !done;
       if (kept) continue;

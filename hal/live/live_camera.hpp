@@ -99,6 +99,7 @@ class LiveCamera : public Camera {
   bool stopping_ = false;
   std::atomic<CameraState> state_{CameraState::unplugged};
   std::atomic<bool> controls_moved_{false};
+  std::atomic<const char*> damage_reason_{nullptr};
   struct Counters {
     std::atomic<std::uint64_t> delivered, lost, skipped, disconnects;
     std::atomic<std::uint64_t> flagged, markers, too_short, undecodable;

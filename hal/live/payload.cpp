@@ -59,7 +59,8 @@ PayloadStatus PayloadDecoder::decode(const FilledBuffer& filled, luma::LumaBuffe
     return status == luma::ExtractStatus::short_payload ? PayloadStatus::too_short
                                                         : PayloadStatus::undecodable;
   }
-  switch (jpeg_->decode(filled.payload, out.data(), out.stride())) {
+  const mjpeg::Status status = jpeg_->decode(filled.payload, out.data(), out.stride());
+  switch (status) {
     case mjpeg::Status::ok:
       return PayloadStatus::ok;
     case mjpeg::Status::empty:
@@ -68,6 +69,7 @@ PayloadStatus PayloadDecoder::decode(const FilledBuffer& filled, luma::LumaBuffe
     case mjpeg::Status::truncated:
       return PayloadStatus::markers;
     default:
+      damage_ = mjpeg::describe(status);
       return PayloadStatus::undecodable;
   }
 }

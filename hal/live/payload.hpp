@@ -23,10 +23,13 @@ class PayloadDecoder {
   [[nodiscard]] PayloadStatus inspect(const FilledBuffer& filled) const noexcept;
   /// Unless ok, `out` is partly written and must not be used.
   [[nodiscard]] PayloadStatus decode(const FilledBuffer& filled, luma::LumaBuffer& out) noexcept;
+  /// Why the newest payload was undecodable, in words that last; null when none was.
+  [[nodiscard]] const char* damage() const noexcept { return damage_; }
 
  private:
   Format format_;
   std::unique_ptr<mjpeg::GreyDecoder> jpeg_;  // null for raw formats
+  const char* damage_ = nullptr;
 };
 
 }  // namespace dtact::hal::live

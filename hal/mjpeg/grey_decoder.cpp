@@ -139,14 +139,13 @@ struct GreyDecoder::Impl {
     if (setjmp(way_out) != 0) return failure;
     begin(payload);
     jpeg_read_header(&cinfo, TRUE);
-    return Status::ok;
+    const bool baseline = cinfo.progressive_mode == 0 && cinfo.arith_code == 0 &&
+                          jpeg_has_multiple_scans(&cinfo) == 0;
+    return baseline ? Status::ok : Status::unsupported;
   }
 
   Status pixels(std::uint8_t* luma, std::ptrdiff_t stride) noexcept {
     if (setjmp(way_out) != 0) return failure;
-    if (cinfo.progressive_mode != 0 || jpeg_has_multiple_scans(&cinfo) != 0) {
-      return Status::unsupported;
-    }
     cinfo.out_color_space = JCS_GRAYSCALE;
     jpeg_start_decompress(&cinfo);
     JDIMENSION left = static_cast<JDIMENSION>(crop.x);

@@ -8,10 +8,10 @@
 #include <span>
 #include <sstream>
 #include <stdexcept>
-#include <system_error>
 #include <utility>
 
 #include "hal/base/atomic_file.hpp"
+#include "hal/base/folder.hpp"
 #include "hal/files/png.hpp"
 #include "hal/mjpeg/grey_decoder.hpp"
 
@@ -32,18 +32,18 @@ std::string lower_extension(const fs::path& file) {
 }
 
 std::vector<fs::path> frames_in(const fs::path& folder) {
-  std::error_code error;
   std::vector<fs::path> png;
   std::vector<fs::path> jpeg;
-  for (const auto& entry : fs::directory_iterator(folder, error)) {
-    const std::string extension = lower_extension(entry.path());
-    if (extension == ".png") png.push_back(entry.path());
-    if (extension == ".jpg" || extension == ".jpeg") jpeg.push_back(entry.path());
-  }
-  if (error) {
+  try {
+    for (const fs::path& file : base::visible_files(folder)) {
+      const std::string extension = lower_extension(file);
+      if (extension == ".png") png.push_back(file);
+      if (extension == ".jpg" || extension == ".jpeg") jpeg.push_back(file);
+    }
+  } catch (const fs::filesystem_error& e) {
     fail(folder, fmt::format("cannot read the recording ({}): set camera.replay.folder to a folder "
                              "of PNG or JPEG frames, or to an .mcap file",
-                             error.message()));
+                             e.code().message()));
   }
   if (png.empty() && jpeg.empty()) {
     fail(folder,
@@ -53,9 +53,7 @@ std::vector<fs::path> frames_in(const fs::path& folder) {
     fail(folder, fmt::format("holds both PNG ({}) and JPEG ({}) frames: put them in two folders",
                              png.front().filename().string(), jpeg.front().filename().string()));
   }
-  std::vector<fs::path> files = png.empty() ? std::move(jpeg) : std::move(png);
-  std::ranges::sort(files);
-  return files;
+  return png.empty() ? jpeg : png;
 }
 
 void check_size(Recording& recording, int width, int height, const fs::path& file) {
@@ -141,10 +139,14 @@ void add_jpeg(Recording& recording, std::string payload, mjpeg::GreyDecoder& dec
   const auto status = decoder.read_size(
       {reinterpret_cast<const std::uint8_t*>(payload.data()), payload.size()}, size);
   if (status != mjpeg::Status::ok) {
-    fail(name, fmt::format("{}: remove it", mjpeg::describe(status)));
+    fail(name, fmt::format("{}: {}", mjpeg::describe(status),
+                           status == mjpeg::Status::unsupported
+                               ? "save the frames as baseline JPEG, or as PNG"
+                               : "remove it"));
   }
   check_size(recording, size.width, size.height, name);
   recording.payloads.push_back(std::move(payload));
+  recording.names.push_back(name.string());
 }
 
 Recording load_recording(const fs::path& path) {

@@ -12,15 +12,17 @@
 namespace dtact::hal::replay {
 
 /// A folder of frames in memory: *.png, decoded, or *.jpg and *.jpeg, as they are; never both. They
-/// are in the order of their names. `timestamps.csv` beside them, if there, says when each was
-/// taken: lines of "file name,nanoseconds", rising, one for each frame, after an optional first
-/// line that names the columns. Or the camera's JPEGs of an MCAP file (dtactctl record): the
-/// messages of its one channel of foxglove.CompressedImage, in the order of their log times.
+/// are in the natural order of their names, hidden files left out. `timestamps.csv` beside them, if
+/// there, says when each was taken: lines of "file name,nanoseconds", rising, one for each frame,
+/// after an optional first line that names the columns. Or the camera's JPEGs of an MCAP file
+/// (dtactctl record): the messages of its one channel of foxglove.CompressedImage, in the order of
+/// their log times.
 struct Recording {
   int width = 0;                         ///< Pixels, of every frame.
   int height = 0;                        ///< Pixels.
   std::vector<luma::LumaBuffer> images;  ///< for a PNG recording
   std::vector<std::string> payloads;     ///< for a JPEG recording
+  std::vector<std::string> names;        ///< of the payloads, for messages
   /// Time of each frame, nanoseconds after the first; empty without timestamps.csv.
   std::vector<std::int64_t> offsets_ns;
   /// What of an MCAP file cannot be played, and why; empty: nothing is left out.

@@ -1,5 +1,7 @@
 #include "hal/replay/replay_camera.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <span>
@@ -53,11 +55,25 @@ CameraReport ReplayCamera::report() const {
   if (!recording_.left_out.empty()) {
     report.fix = "not all of the recording is played: " + recording_.left_out;
   }
+  if (const mjpeg::Status damage = damage_; damage != mjpeg::Status::ok) {
+    report.damage_reason =
+        fmt::format("{}: {}", recording_.names[damaged_frame_], mjpeg::describe(damage));
+  }
   if (ended_) {
     report.state = CameraState::ended;
     report.fix = "the recording has been played: set camera.replay.loop = true to repeat it";
   }
   return report;
+}
+
+void check(const CameraConfig& config) {
+  CameraConfig unpaced = config;
+  unpaced.replay.paced = false;
+  ReplayCamera camera(unpaced);
+  camera.start();
+  Frame first;
+  if (camera.grab(first, {}) == GrabStatus::ok) return;
+  throw std::runtime_error(camera.report().damage_reason + ": remove the frame or record it again");
 }
 
 void ReplayCamera::start() {
@@ -128,6 +144,8 @@ GrabStatus ReplayCamera::lend(Frame& out, FrameInfo info) noexcept {
   const auto status = decoder_.decode(jpeg, buffer.data(), buffer.stride());
   if (status != mjpeg::Status::ok) {
     ++damaged_;
+    damaged_frame_ = frame;
+    damage_ = status;
     return GrabStatus::damaged;
   }
   info.decode_ns = clock_.monotonic_ns() - began_ns;

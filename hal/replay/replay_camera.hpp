@@ -53,7 +53,13 @@ class ReplayCamera final : public Camera, private FrameOwner {
   std::atomic<std::uint64_t> delivered_{0};
   std::atomic<std::uint64_t> skipped_{0};
   std::atomic<std::uint64_t> damaged_{0};
+  std::atomic<std::size_t> damaged_frame_{0};             ///< The newest of them, in the recording.
+  std::atomic<mjpeg::Status> damage_{mjpeg::Status::ok};  ///< Its decoder's answer.
   std::atomic<bool> ended_{false};
 };
+
+/// Reads the recording and decodes its first frame. Throws as the constructor does, or
+/// std::runtime_error with the frame's name and the decoder's reason.
+void check(const CameraConfig& config);
 
 }  // namespace dtact::hal::replay

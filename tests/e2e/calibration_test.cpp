@@ -5,6 +5,8 @@
 #include <csignal>
 
 #include "hal/base/atomic_file.hpp"
+#include "hal/sim/scene.hpp"
+#include "tests/e2e/depth_error.hpp"
 #include "tests/e2e/sensor.hpp"
 
 namespace dtact::e2e {
@@ -12,6 +14,7 @@ namespace {
 
 using ::testing::AllOf;
 using ::testing::HasSubstr;
+using ::testing::StartsWith;
 
 bool depth_flows(client::Client& client) {
   return read_until(client, [](const Item& item) {
@@ -49,6 +52,57 @@ TEST(Calibration, UncalibratedServesLumaAndSaysHowToCalibrate) {
   const v1::Status status = client.status();
   EXPECT_EQ(status.state(), v1::STATE_UNCALIBRATED);
   EXPECT_THAT(status.advice(), HasSubstr("dtact-calibrate"));
+}
+
+// config/simulated, as the package installs it. When this fails after a change of the simulator or
+// of calibration: ./dev calibration.
+TEST(Calibration, TheSimulatedSensorHasOneOfItsOwn) {
+  const std::string shipped = scene_file("../simulated").string();
+  Sensor sensor({}, false, {"camera.sim.calibration=" + shipped});
+  {
+    client::Client client = sensor.connect();
+    client.subscribe();
+    const hal::sim::Truth truth(hal::sim::default_scene());
+    int pressed = 0;
+    double force_n = 0;
+    ASSERT_TRUE(read_until(client, [&](const Item& item) {
+      const auto* frame = std::get_if<v1::Frame>(&item);
+      if (frame == nullptr || !frame->has_depth() || frame->sequence() % 720 >= 360) return false;
+      const DepthError error = depth_error(*frame, truth);
+      if (error.inside_pixels <= 5000) return false;
+      EXPECT_LE(error.inside_mm, 0.03);
+      for (const v1::Health flag : {v1::HEALTH_CAMERA_MISMATCH, v1::HEALTH_LIGHT_MISMATCH,
+                                    v1::HEALTH_CAMERA_SHIFTED, v1::HEALTH_BEYOND_CALIBRATION}) {
+        EXPECT_FALSE(has(frame->health(), flag)) << v1::Health_Name(flag);
+      }
+      force_n = std::max(force_n, frame->contact().force_n());
+      return ++pressed == 5;
+    }));
+    EXPECT_GT(force_n, 0.1);
+    EXPECT_EQ(client.status().calibration().name(), "simulated");
+  }
+  std::string output;
+  EXPECT_EQ(ctl(sensor, {"status"}, &output), 0) << output;
+  EXPECT_THAT(output, HasSubstr("sim sim:dtact-sim (simulated), 800x600"));
+  EXPECT_EQ(ctl(sensor, {"watch", "--seconds", "1.5"}, &output), 0) << output;
+  EXPECT_THAT(output, AllOf(StartsWith("simulated  "), HasSubstr(" fps  contact ")));
+  // One that is uploaded takes its place, also after a restart, until "configured" is activated.
+  EXPECT_EQ(ctl(sensor, {"calibration", "upload", calibration_folder().string()}, &output), 0);
+  sensor.restart();
+  EXPECT_EQ(sensor.connect().status().calibration().name(), "calibration");
+  EXPECT_EQ(ctl(sensor, {"calibration", "activate", "configured"}, &output), 0) << output;
+  EXPECT_EQ(sensor.connect().status().calibration().name(), "simulated");
+}
+
+TEST(Calibration, NoOtherCameraGetsTheSimulatedSensorsOne) {
+  const std::string shipped = scene_file("../simulated").string();
+  Sensor sensor({}, false, {"camera.sim.calibration=" + shipped, "camera.backend=null"});
+  const v1::Status status = sensor.connect().status();
+  EXPECT_FALSE(status.has_calibration());
+  EXPECT_EQ(status.state(), v1::STATE_UNCALIBRATED);
+  std::string output;
+  EXPECT_EQ(ctl(sensor, {"calibration", "activate", "configured"}, &output), 1);
+  EXPECT_THAT(output, HasSubstr("the configuration file names no calibration"));
 }
 
 TEST(Calibration, UploadBringsDepthAndOutlivesARestart) {

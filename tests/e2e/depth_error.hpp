@@ -27,16 +27,21 @@ inline DepthError depth_error(const v1::Frame& frame, const hal::sim::Truth& tru
   truth.contact(frame.sequence(), contact);
   const auto width = static_cast<std::size_t>(truth.scene().camera.width);
 
+  // The map shows the middle of the image.
+  const auto map_width = static_cast<std::size_t>(frame.depth().width());
+  const auto map_height = static_cast<std::size_t>(frame.depth().height());
+  const std::size_t column = (width - map_width) / 2;
+  const std::size_t row = (static_cast<std::size_t>(truth.scene().camera.height) - map_height) / 2;
   const std::vector<float> mm = client::millimetres_of(frame.depth());
 
   DepthError error;
   double inside = 0;
   double outside = 0;
   int outside_pixels = 0;
-  for (std::size_t y = 0; y < kCropHeight; ++y) {
-    for (std::size_t x = 0; x < kCropWidth; ++x) {
-      const std::size_t at = (y + kCropRow) * width + x + kCropColumn;
-      const float depth = mm[y * kCropWidth + x];
+  for (std::size_t y = 0; y < map_height; ++y) {
+    for (std::size_t x = 0; x < map_width; ++x) {
+      const std::size_t at = (y + row) * width + x + column;
+      const float depth = mm[y * map_width + x];
       const bool in_contact = contact[at] != 0;
       if (in_contact) ++error.inside_pixels;
       if (std::isnan(depth)) {

@@ -25,9 +25,10 @@ std::string output_of(const std::string& command) {
   return output;
 }
 
-/// The block of README.md that begins with ```LANGUAGE.
-std::string block(const std::string& language) {
-  const std::string text = base::read_file(DTACT_SOURCE_DIR "/clients/cpp/README.md");
+/// The block of a page that begins with ```LANGUAGE.
+std::string block(const std::string& language,
+                  const char* page = DTACT_SOURCE_DIR "/clients/cpp/README.md") {
+  const std::string text = base::read_file(page);
   const std::string fence = "```" + language + "\n";
   const std::size_t begin = text.find(fence) + fence.size();
   return text.substr(begin, text.find("```", begin) - begin);
@@ -92,6 +93,33 @@ TEST_F(Library, IsFoundByPkgConfig) {
             "' example.cpp $(pkg-config --cflags --libs dtact)");
   EXPECT_THAT(output_of("readelf -d '" + program + "'"), HasSubstr("[libdtact.so.1]"));
   expect_depth(program);
+}
+
+// README.md's example, on what the package installs, and on a sensor that is not calibrated.
+TEST_F(Library, TheFirstExampleShowsDepthOrSaysWhyNot) {
+  std::string source = block("cpp", DTACT_SOURCE_DIR "/README.md");
+  const std::string where = "{.host = \"localhost\"}";
+  ASSERT_NE(source.find(where), std::string::npos);
+  source.replace(source.find(where), where.size(), "{.host = argv[1]}");
+  source.replace(source.find("main()"), 6, "main(int, char** argv)");
+  std::ofstream(example() / "first.cpp") << source;
+  const std::string program = (example() / "first").string();
+  output_of("cd '" + example().string() + "'; export PKG_CONFIG_PATH='" +
+            (libraries() / "pkgconfig").string() +
+            "'; '" DTACT_COMPILER "' " DTACT_FLAGS " -std=c++20 -o '" + program +
+            "' first.cpp $(pkg-config --cflags --libs dtact)");
+  const auto run = [&](const Sensor& sensor, std::string* output) {
+    return run_program({"/bin/sh", "-ec",
+                        "LD_LIBRARY_PATH='" + libraries().string() + "' exec '" + program +
+                            "' 127.0.0.1:" + std::to_string(sensor.daemon->port())},
+                       output);
+  };
+  std::string output;
+  const std::string shipped = scene_file("../simulated").string();
+  EXPECT_EQ(run(Sensor({}, false, {"camera.sim.calibration=" + shipped}), &output), 0) << output;
+  EXPECT_TRUE(std::regex_match(output, std::regex(R"(\d[\d.e-]* mm deep\n)"))) << output;
+  EXPECT_EQ(run(Sensor({}, false), &output), 1);
+  EXPECT_THAT(output, HasSubstr("no depth: No calibration: dtact-calibrate guided"));
 }
 
 // Exported names without a namespace: only the version's own.

@@ -50,7 +50,8 @@ Sensor::Sensor(const fs::path& scene, bool calibrated, const std::vector<std::st
     arguments.insert(arguments.end(), {"--set", setting});
   };
   if (!scene.empty()) set("camera.sim.scene=" + scene.string());
-  if (calibrated) set("calibration=" + calibration_folder().string());
+  // The simulated sensor's own may be installed on this machine.
+  set(calibrated ? "calibration=" + calibration_folder().string() : "camera.sim.calibration=");
   for (const std::string& setting : settings) set(setting);
   daemon = std::make_unique<DaemonProcess>(arguments);
 }

@@ -30,6 +30,8 @@ FILES = {
         /usr/share/doc/dtactd/examples/network.conf
         /usr/share/dtactd/scenes/calibration_presses.toml
         /usr/share/dtactd/scenes/default.toml
+        /usr/share/dtactd/simulated/calibration.toml
+        /usr/share/dtactd/simulated/reference.png
         /usr/share/man/man5/dtactd.toml.5.gz
         /usr/share/man/man8/dtactd.8.gz
         /usr/share/bash-completion/completions/dtactd
@@ -80,7 +82,7 @@ BACK_OFF = """
 # The folders and names that a package may have files in.
 PLACES = {
     "dtactd": r"/etc/dtactd/|/usr/bin/dtactd$|(/usr)?/lib/systemd/system/dtactd|/usr/lib/\w+\.d/dtactd|"
-    r"/usr/lib/udev/rules\.d/60-dtactd|/usr/share/dtactd/scenes/|/usr/share/man/man[58]/dtactd|"
+    r"/usr/lib/udev/rules\.d/60-dtactd|/usr/share/dtactd/(scenes|simulated)/|/usr/share/man/man[58]/dtactd|"
     r"/usr/share/(bash|zsh)",
     "dtact-tools": r"/usr/bin/dtact(ctl|-calibrate|-perceive|-web)$|/usr/share/(bash|zsh)|/usr/share/dtact/foxglove|"
     r"(/usr)?/lib/systemd/system/dtact-(perceive|web)\.service$|/usr/share/man/man1/dtact",

@@ -10,6 +10,7 @@
 
 #include "daemon/calibration/calibration.hpp"
 #include "hal/base/atomic_file.hpp"
+#include "hal/base/folder.hpp"
 
 namespace dtact::ctl {
 namespace {
@@ -19,14 +20,13 @@ namespace fs = std::filesystem;
 std::vector<fs::path> files_of(const fs::path& path, const std::string& option) {
   if (!fs::is_directory(path)) return {path};
   std::vector<fs::path> files;
-  for (const fs::directory_entry& entry : fs::directory_iterator(path)) {
-    if (entry.path().extension() == ".png") files.push_back(entry.path());
+  for (const fs::path& file : base::visible_files(path)) {
+    if (file.extension() == ".png") files.push_back(file);
   }
   if (files.empty()) {
     throw std::runtime_error(
         fmt::format("{}: no .png file in the folder {}", option, path.string()));
   }
-  std::ranges::sort(files);
   return files;
 }
 

@@ -9,6 +9,13 @@ grep -E '^(Creating|Created|W:|E:|warning)' /tmp/apt || true
 within 300 serving
 dtactctl status | head -n 3
 frames 60 10
+# What README shows next: depth, of the simulated sensor.
+has_depth() {
+  dtactctl watch --seconds 3 > /tmp/watch && grep '^simulated  ' /tmp/watch && grep ' frames, [1-9][0-9]* with depth' /tmp/watch
+}
+within 120 has_depth
+say "$(tail -n 1 /tmp/watch)"
+expect 'calibration  simulated, ' dtactctl status
 systemctl status --no-pager dtactd | sed -n 's/^ *Status: /status: /p'
 systemd-analyze security --no-pager dtactd | tail -n 1
 [ "$(property NRestarts)" = 0 ] || fail "restarted: $(journalctl -b -u dtactd)"

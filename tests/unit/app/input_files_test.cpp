@@ -6,6 +6,9 @@
 #include <stdexcept>
 
 #include "daemon/app/files.hpp"
+#include "hal/base/atomic_file.hpp"
+#include "hal/registry.hpp"
+#include "tests/fakes/own_path.hpp"
 
 namespace dtact::app {
 namespace {
@@ -51,6 +54,41 @@ TEST(InputFiles, OnlyTheCameraThatIsConfiguredReadsSome) {
   EXPECT_EQ(said(), "no error");
   camera.replay.folder = "/no/such/press.mcap";
   EXPECT_THAT(said(), AllOf(StartsWith("camera.replay.folder = "), Not(HasSubstr("service"))));
+}
+
+// What --check-config does beyond looking whether the files can be read.
+TEST(InputFiles, ARecordingsFirstFrameIsDecoded) {
+  const std::filesystem::path folder = fakes::own_path();
+  std::filesystem::create_directories(folder);
+  base::write_file_atomically(folder / "1.jpg", "\xff\xd8 no frame");
+  hal::CameraConfig camera;
+  camera.backend = "replay";
+  camera.replay.folder = folder;
+  EXPECT_EQ(error([&] { check_camera_files(camera); }), "no error");
+  EXPECT_THAT(error([&] { check_camera(camera); }), StartsWith((folder / "1.jpg").string() + ": "));
+  std::filesystem::remove_all(folder);
+  camera.backend = "sim";
+  camera.sim.scene = folder;
+  EXPECT_THAT(error([&] { check_camera(camera); }), StartsWith("camera.sim.scene = "));
+}
+
+// A real camera must never show depth by the simulated sensor's calibration.
+TEST(InputFiles, OnlyTheSimulatedSensorHasACalibrationOfItsOwn) {
+  Config config;
+  EXPECT_EQ(config.sim_calibration, "/usr/share/dtactd/simulated");
+  config.sim_calibration = "/no/such/simulated";
+  for (const std::string& backend : hal::camera_backends()) {
+    config.hal.camera.backend = backend;
+    EXPECT_EQ(calibration_folder(config), backend == "sim" ? "/no/such/simulated" : "") << backend;
+    EXPECT_THAT(error([&] { check_calibration(config); }),
+                StartsWith(backend == "sim" ? "camera.sim.calibration = " : "no error"));
+  }
+  config.calibration = "/no/such/own";
+  for (const std::string& backend : hal::camera_backends()) {
+    config.hal.camera.backend = backend;
+    EXPECT_EQ(calibration_folder(config), "/no/such/own") << backend;
+    EXPECT_THAT(error([&] { check_calibration(config); }), StartsWith("calibration = "));
+  }
 }
 
 }  // namespace

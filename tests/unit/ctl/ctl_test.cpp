@@ -89,7 +89,8 @@ TEST(Status, IsPrinted) {
                               "switches 7 waiting, 8 pre")));
   EXPECT_THAT(result.out, AllOf(StartsWith("state        serving\nhealth       not_realtime\n"),
                                 HasSubstr("LimitRTPRIO"), HasSubstr("camera       sim"),
-                                HasSubstr("calibration  none"), HasSubstr("brightness 255"),
+                                HasSubstr(" (simulated), "), HasSubstr("calibration  none"),
+                                HasSubstr("brightness 255"),
                                 HasSubstr("reference    follows the light by -0.42 %")));
 }
 

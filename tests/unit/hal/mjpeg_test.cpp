@@ -121,6 +121,8 @@ TEST_F(GreyDecoderTest, AnotherSizeIsReported) {
 
 TEST_F(GreyDecoderTest, ProgressiveIsUnsupported) {
   EXPECT_EQ(decode(make_jpeg({.progressive = true}, slope)), Status::unsupported);
+  Size size;
+  EXPECT_EQ(decoder.read_size(make_jpeg({.progressive = true}, slope), size), Status::unsupported);
   EXPECT_EQ(decode(make_jpeg({}, slope)), Status::ok);
 }
 

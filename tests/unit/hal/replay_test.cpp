@@ -92,6 +92,20 @@ TEST_F(ReplayTest, PlaysInTheOrderOfNamesAndLoops) {
   EXPECT_EQ(camera.report().delivered, 7U);
 }
 
+TEST_F(ReplayTest, PlaysNumberedFramesInTheOrderOfTheirNumbers) {
+  for (const int number : {1, 2, 9, 10, 11, 100}) {
+    png(std::to_string(number) + ".png", static_cast<std::uint8_t>(number));
+  }
+  write("._1.png", "what macOS puts beside it");
+  write(".thumbnail.jpg", "");
+  ReplayCamera& camera = open();
+  camera.start();
+  for (const int expected : {1, 2, 9, 10, 11, 100, 1}) {
+    ASSERT_EQ(camera.grab(frame, milliseconds(50)), GrabStatus::ok);
+    EXPECT_EQ(frame.luma().row(0)[0], expected);
+  }
+}
+
 TEST_F(ReplayTest, EndsWhenPlayedOnce) {
   png("a.png", 10);
   png("b.png", 20);
@@ -196,7 +210,38 @@ TEST_F(ReplayTest, ADamagedJpegIsADamagedFrame) {
   EXPECT_EQ(camera.grab(frame, milliseconds(50)), GrabStatus::damaged);
   ASSERT_EQ(camera.grab(frame, milliseconds(50)), GrabStatus::ok);
   EXPECT_EQ(camera.report().damaged, 1U);
+  EXPECT_EQ(camera.report().damage_reason,
+            (folder / "b.jpg").string() + ": the payload ends before the end-of-image marker");
   EXPECT_EQ(frame.luma().row(0)[0], 10);
+  EXPECT_NO_THROW(check(config));
+}
+
+TEST_F(ReplayTest, RefusesProgressiveJpegAndSaysWhatToDo) {
+  const auto bytes = fakes::make_jpeg({.width = 100, .height = 50, .progressive = true},
+                                      [](int x, int y) { return x + y; });
+  write("a.jpg", jpeg_bytes(10));
+  write("b.jpg", {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+  EXPECT_EQ(failure(), (folder / "b.jpg").string() +
+                           ": the payload is not a baseline JPEG of one interleaved scan: save the "
+                           "frames as baseline JPEG, or as PNG");
+}
+
+TEST_F(ReplayTest, ACheckDecodesTheFirstFrame) {
+  const std::string whole = jpeg_bytes(20);
+  write("1.jpg", whole.substr(0, whole.size() - 10));
+  write("10.jpg", whole);
+  config.replay.paced = true;
+  try {
+    check(config);
+    FAIL();
+  } catch (const std::runtime_error& e) {
+    EXPECT_EQ(e.what(),
+              (folder / "1.jpg").string() +
+                  ": the payload ends before the end-of-image marker: remove the frame or "
+                  "record it again");
+  }
+  fs::remove(folder / "1.jpg");
+  EXPECT_NO_THROW(check(config));
 }
 
 TEST_F(ReplayTest, RefusesFoldersWithoutFrames) {

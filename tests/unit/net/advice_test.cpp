@@ -56,6 +56,13 @@ TEST(Advice, SaysWhatToDoAboutDamagedFramesOnly) {
   EXPECT_EQ(advice(status),
             "The camera gives no usable frames. All that come are damaged: check its USB cable, "
             "hub and port, or set another pixel_format or a lower camera.fps.");
+  status.camera_report.damage_reason = "the payload's coded data is broken";
+  EXPECT_THAT(advice(status), HasSubstr("damaged (the payload's coded data is broken): check its"));
+  status.camera.backend = "replay";
+  status.camera_report.damage_reason = "/frames/7.jpg: the payload is empty";
+  EXPECT_EQ(advice(status),
+            "The camera gives no usable frames. All that come are damaged (/frames/7.jpg: the "
+            "payload is empty): play a recording that is whole.");
 }
 
 TEST(Advice, SaysHowFarTheCameraHasMovedOnlyWhileItHas) {

@@ -183,6 +183,7 @@ TEST(V4l2Camera, AnUndecodableJpegIsCountedByItsCause) {
   const DamageCounts damage = camera.report().damage;
   EXPECT_EQ(damage.undecodable + damage.markers, 2U);
   EXPECT_EQ(damage.too_short, 1U);
+  EXPECT_EQ(camera.report().damage_reason, "the payload's coded data is broken");
 }
 
 TEST(V4l2Camera, AModeTheDriverBendsIsAnErrorThatNamesTheOffer) {

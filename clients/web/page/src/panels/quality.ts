@@ -94,10 +94,11 @@ export class QualityPanel {
       const reported = trouble
         .filter(([count]) => count > 0n)
         .map(([count, name]) => `, ${count} ${name}`);
+      const simulated = camera.backend === "sim" ? "simulated, " : "";
       const state = camera.state === "streaming" ? "" : `${camera.state}, `;
       this.facts.set(
         "camera",
-        `${state}${fixed(status.fps, 1)} of ${fixed(camera.fps, 0)} fps${reported.join("")}`,
+        `${simulated}${state}${fixed(status.fps, 1)} of ${fixed(camera.fps, 0)} fps${reported.join("")}`,
       );
     }
     const made = status.calibration;

@@ -1,0 +1,383 @@
+// dtactctl setup: from a plugged-in camera to depth, by the programs that do each step.
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <spawn.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cerrno>
+#include <chrono>
+#include <cstring>
+#include <filesystem>
+#include <iostream>
+#include <memory>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "clients/common/exit_codes.hpp"
+#include "clients/common/interruptible.hpp"
+#include "clients/common/sibling_program.hpp"
+#include "clients/cpp/client.hpp"
+#include "clients/ctl/online.hpp"
+#include "clients/ctl/setup_plan.hpp"
+#include "hal/base/atomic_file.hpp"
+#include "hal/files/key_reader.hpp"
+
+namespace dtact::ctl {
+namespace {
+
+namespace fs = std::filesystem;
+using Command = std::vector<std::string>;
+
+constexpr const char* kBoards = "/usr/share/doc/dtactd/examples/boards";
+constexpr const char* kSimulated = "sim";
+const std::vector<std::string> kSteps = {"camera", "check", "restart", "calibrate", "watch"};
+
+struct SetupOptions {
+  std::vector<std::string> steps;  ///< Empty: all.
+  std::string unit = "dtactd";
+  std::string config;  ///< Empty: the unit's.
+  std::string camera;
+  std::string mode;
+  std::string board;
+  std::string radius_mm;
+  std::string mm_per_px;
+  std::string lens;
+  std::string crop;
+};
+
+/// Runs a program on this terminal. Returns its exit status, 127 when it is not there.
+int run_program(const Command& command, std::ostream& out) {
+  out << "$ " << fmt::format("{}", fmt::join(command, " ")) << std::endl;
+  std::vector<char*> arguments;
+  for (const std::string& argument : command) {
+    arguments.push_back(const_cast<char*>(argument.c_str()));
+  }
+  arguments.push_back(nullptr);
+  const cli::Interruptible while_it_runs;  // Ctrl-C is the program's
+  pid_t child = 0;
+  if (const int error =
+          ::posix_spawnp(&child, arguments[0], nullptr, nullptr, arguments.data(), environ)) {
+    throw std::runtime_error(fmt::format("cannot run {}: {}", command[0], std::strerror(error)));
+  }
+  int status = 0;
+  while (::waitpid(child, &status, 0) < 0 && errno == EINTR) {
+  }
+  return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+}
+
+class Setup {
+ public:
+  Setup(const Context& context, SetupOptions options)
+      : context_(context), options_(std::move(options)) {
+    if (!options_.config.empty()) return;
+    const std::size_t at = options_.unit.find('@');
+    options_.config = fmt::format(
+        "/etc/dtactd/{}.toml", at == std::string::npos ? "dtactd" : options_.unit.substr(at + 1));
+  }
+
+  void run() {
+    const bool all = options_.steps.empty();
+    for (const std::string& step : all ? kSteps : options_.steps) {
+      context_.out << fmt::format("\n{} of {}: {}\n", number_of(step), kSteps.size(), step);
+      step_ = step;
+      if (step == "camera") set_camera();
+      if (step == "check") check();
+      if (step == "restart") restart();
+      if (step == "calibrate" && !(all && calibrated())) calibrate();
+      if (step == "watch") watch();
+    }
+  }
+
+ private:
+  static std::ptrdiff_t number_of(const std::string& step) {
+    return std::ranges::find(kSteps, step) - kSteps.begin() + 1;
+  }
+
+  /// Ends the command; names the steps that are left.
+  [[noreturn]] void stop(const std::string& what) const {
+    const std::vector<std::string> left(kSteps.begin() + number_of(step_) - 1, kSteps.end());
+    throw cli::Failure(
+        cli::kNotMet, fmt::format("{}; then go on: dtactctl setup {}", what, fmt::join(left, " ")));
+  }
+
+  /// A line typed here; empty when nothing can be. Byte by byte: the rest is the next program's.
+  [[nodiscard]] std::string ask(const std::string& question) const {
+    context_.out << question << std::flush;
+    std::string line;
+    for (char c = 0; ::read(STDIN_FILENO, &c, 1) == 1 && c != '\n';) line += c;
+    return line;
+  }
+
+  // 1: the configuration
+  // ----------------------------------------------------------------------------
+
+  void set_camera() {
+    const std::string before = base::read_file(options_.config);
+    const Settings old = settings_of(before, options_.config);
+    Settings wanted = board_settings();
+    if (options_.camera == kSimulated) {
+      wanted = {{"camera.backend", "\"sim\""}, {"ring.backend", "\"sim\""}};
+    } else if (value_of(wanted, "camera.backend") != "\"libcamera\"") {
+      add_usb_camera(wanted);
+      // The simulated ring lights no real sensor.
+      const std::string ring = value_of(wanted, "ring.backend", value_of(old, "ring.backend"));
+      if (ring.empty() || ring == "\"sim\"") {
+        assign(wanted, "ring.backend", "\"null\"");
+        context_.out << "ring: none that this computer commands; for one see [ring] in "
+                     << options_.config << '\n';
+      }
+    }
+    write(before, old, wanted);
+  }
+
+  /// What the board's configuration sets, the network aside.
+  [[nodiscard]] Settings board_settings() const {
+    std::string board = options_.board;
+    if (board.empty()) {
+      std::string model;
+      if (fs::exists("/proc/device-tree/model")) model = base::read_file("/proc/device-tree/model");
+      board = board_of(model);
+      if (board.empty()) return {};
+      context_.out << "board: " << model.c_str() << '\n';
+    }
+    const fs::path file =
+        board.ends_with(".toml") ? fs::path(board) : fs::path(kBoards) / (board + ".toml");
+    context_.out << "settings of the board: " << file.string() << '\n';
+    Settings settings = settings_of(base::read_file(file), file.string());
+    std::erase_if(settings, [](const Setting& each) { return each.key.starts_with("net."); });
+    return settings;
+  }
+
+  void add_usb_camera(Settings& wanted) const {
+    std::vector<hal::v4l2::SurveyedCamera> cameras = hal::v4l2::survey_cameras();
+    const bool named = !options_.camera.empty();
+    std::erase_if(cameras, [&](const hal::v4l2::SurveyedCamera& camera) {
+      const hal::v4l2::Attached& who = camera.attached;
+      if (!named) return !who.not_taken.empty();
+      return options_.camera != who.stable_name() && options_.camera != who.by_id &&
+             options_.camera != who.node && options_.camera != "serial:" + who.serial &&
+             options_.camera != "bus:" + who.bus;
+    });
+    if (cameras.empty()) {
+      stop(named ? fmt::format("no camera {} is attached: dtactctl cameras lists those that are",
+                               options_.camera)
+                 : "no USB camera is attached: plug it in; for a CSI camera add "
+                   "--board raspberry-pi-5-csi-spi");
+    }
+    const hal::v4l2::SurveyedCamera& camera = cameras[choose(cameras)];
+    if (!camera.attached.problem.empty()) stop(camera.attached.problem);
+    const auto best = options_.mode.empty() ? best_mode(camera.modes) : parse_mode(options_.mode);
+    if (!best)
+      stop("the camera delivers no format that dtactd reads: dtactctl cameras lists its modes");
+    const bool offered = std::ranges::any_of(camera.modes, [&](const hal::v4l2::Mode& mode) {
+      return mode.usable() && mode.offers(best->width, best->height, best->fps);
+    });
+    if (!offered && !options_.mode.empty()) {
+      stop(fmt::format("the camera has no mode {}; it has {}", options_.mode,
+                       hal::v4l2::describe(camera.modes)));
+    }
+    context_.out << fmt::format("camera: {} ({}), {}; --mode takes another of {}\n",
+                                camera.attached.stable_name(), camera.attached.card, text_of(*best),
+                                hal::v4l2::describe(camera.modes));
+    assign(wanted, "camera.backend", "\"v4l2\"");
+    assign(wanted, "camera.width", std::to_string(best->width));
+    assign(wanted, "camera.height", std::to_string(best->height));
+    assign(wanted, "camera.fps", fmt::format("{:.2f}", best->fps));
+    // "" follows the only camera to another port.
+    const bool only = !named && cameras.size() == 1;
+    assign(wanted, "camera.v4l2.device",
+           tomlfile::quoted(only ? "" : camera.attached.stable_name()));
+  }
+
+  [[nodiscard]] std::size_t choose(const std::vector<hal::v4l2::SurveyedCamera>& cameras) const {
+    if (cameras.size() == 1) return 0;
+    for (std::size_t i = 0; i < cameras.size(); ++i) {
+      context_.out << fmt::format("  {}  {} ({})\n", i + 1, cameras[i].attached.stable_name(),
+                                  cameras[i].attached.card);
+    }
+    const std::string typed = ask("Which camera looks at the gel? Its number: ");
+    for (std::size_t i = 0; i < cameras.size(); ++i) {
+      if (typed == std::to_string(i + 1)) return i;
+    }
+    stop("several cameras are attached: type the number of one, or name it by --camera");
+  }
+
+  static std::string value_of(const Settings& settings, const std::string& key,
+                              const std::string& otherwise = "") {
+    const auto found = std::ranges::find(settings, key, &Setting::key);
+    return found == settings.end() ? otherwise : found->value;
+  }
+  static void assign(Settings& settings, const std::string& key, const std::string& value) {
+    std::erase_if(settings, [&](const Setting& each) { return each.key == key; });
+    settings.push_back({key, value});
+  }
+
+  /// Replaces the configuration by one that dtactd accepts.
+  void write(const std::string& before, const Settings& old, const Settings& wanted) const {
+    const std::string after = with_settings(before, wanted, options_.config);
+    const Settings fresh = settings_of(after, options_.config);
+    for (const Setting& setting : wanted) {
+      const std::string was = value_of(old, setting.key, "not set");
+      const std::string is = value_of(fresh, setting.key);
+      if (was != is) context_.out << fmt::format("  {} = {} (was {})\n", setting.key, is, was);
+    }
+    if (after == before) {
+      context_.out << options_.config << " has these settings already\n";
+      return;
+    }
+    struct stat about{};
+    if (::stat(options_.config.c_str(), &about) != 0 ||
+        ::access(options_.config.c_str(), W_OK) != 0) {
+      stop(fmt::format("cannot write {} ({}): run it by sudo", options_.config,
+                       std::strerror(errno)));
+    }
+    const std::string trial = options_.config + ".new";
+    base::write_file_atomically(trial, after, about.st_mode & 0777U);
+    const int status =
+        run_program({cli::sibling("dtactd"), "--config", trial, "--check-config"}, context_.out);
+    std::error_code ignored;
+    fs::remove(trial, ignored);
+    if (status != 0) stop("dtactd refuses these settings, nothing is written: see above");
+    base::write_file_atomically(options_.config, after, about.st_mode & 0777U);
+    context_.out << options_.config << " is written\n";
+  }
+
+  // 2 to 5: the programs
+  // ----------------------------------------------------------------------------
+
+  void check() const {
+    const std::string dtactd = cli::sibling("dtactd");
+    if (run_program({dtactd, "--config", options_.config, "--check-config"}, context_.out) != 0 ||
+        run_program({dtactd, "--config", options_.config, "--doctor"}, context_.out) != 0) {
+      stop("fix what is marked WRONG above");
+    }
+  }
+
+  void restart() const {
+    if (run_program({"systemctl", "restart", options_.unit}, context_.out) != 0) {
+      stop(fmt::format("the service does not start: systemctl status {} says why", options_.unit));
+    }
+    const v1::Status status = wait_for_camera();
+    context_.out << fmt::format("the service runs: camera {}, {}x{} at {:g} fps\n",
+                                status.camera().identity(), status.camera().width(),
+                                status.camera().height(), status.camera().fps());
+  }
+
+  /// The daemon's status once it gets frames.
+  [[nodiscard]] v1::Status wait_for_camera() const {
+    std::string why;
+    for (int tries = 0; tries < 150; ++tries) {
+      try {
+        v1::Status status = client::Client(context_.target).status();
+        if (status.camera().delivered() > 0 && status.state() != v1::STATE_CAMERA_LOST) {
+          return status;
+        }
+        why = status.advice();
+      } catch (const client::Error& e) {
+        why = e.what();
+      }
+      std::this_thread::sleep_for(std::chrono::milliseconds(200));
+    }
+    stop("the daemon gets no frames: " + why);
+  }
+
+  /// Whether the calibration that is there may stay.
+  [[nodiscard]] bool calibrated() const {
+    const v1::Status status = wait_for_camera();
+    const auto& health = status.health();
+    if (!status.has_calibration() ||
+        std::ranges::find(health, v1::HEALTH_CAMERA_MISMATCH) != health.end()) {
+      return false;
+    }
+    context_.out << fmt::format(
+        "{} is calibrated, by {}; dtactctl setup calibrate makes another one\n",
+        status.camera().identity(), status.calibration().name());
+    return true;
+  }
+
+  void calibrate() const {
+    Command command = {cli::sibling("dtact-calibrate")};
+    add_target(command);
+    command.emplace_back("guided");
+    const auto add = [&command](const std::string& option, const std::string& value) {
+      if (!value.empty()) command.insert(command.end(), {option, value});
+    };
+    const auto asked = [this](const std::string& given, const std::string& question) {
+      const std::string value = given.empty() ? ask(question) : given;
+      if (value.empty()) stop("give --radius-mm, and --mm-per-px or --lens");
+      return value;
+    };
+    add("--radius-mm", asked(options_.radius_mm, "Radius of the ball that you press in, mm: "));
+    if (options_.lens.empty()) {
+      add("--mm-per-px", asked(options_.mm_per_px,
+                               "Millimetres of the gel that a pixel shows (a ruler's picture, "
+                               "mm over pixels): "));
+    }
+    add("--lens", options_.lens);
+    add("--crop", options_.crop);
+    if (run_program(command, context_.out) != 0) stop("there is no calibration yet");
+  }
+
+  void watch() const {
+    Command command = {cli::sibling("dtactctl")};
+    add_target(command);
+    const bool terminal = &context_.out == &std::cout && ::isatty(STDOUT_FILENO) == 1;
+    command.insert(command.end(), {"watch", terminal ? "--draw" : "--seconds=5"});
+    if (run_program(command, context_.out) != 0) stop("no depth came: dtactctl status says why");
+  }
+
+  void add_target(Command& command) const {
+    command.insert(command.end(), {"--host", context_.target.host, "--port",
+                                   std::to_string(context_.target.port)});
+  }
+
+  const Context& context_;
+  SetupOptions options_;
+  std::string step_;
+};
+
+}  // namespace
+
+void add_setup(CLI::App& app, Context& context) {
+  auto* command = app.add_subcommand(
+      "setup",
+      "Guide from a plugged-in camera to depth: camera (finds it and writes the configuration, "
+      "comments kept), check (dtactd --doctor), restart (of the service), calibrate "
+      "(dtact-calibrate "
+      "guided), watch");
+  const auto options = std::make_shared<SetupOptions>();
+  command->add_option("step", options->steps, "Only these steps, in this order (default: all)")
+      ->check(CLI::IsMember(kSteps));
+  command->add_option("--unit", options->unit, "The service, as dtactd@left")
+      ->capture_default_str();
+  command->add_option("--config", options->config, "Its configuration (default: in /etc/dtactd)")
+      ->type_name("FILE");
+  command
+      ->add_option("--camera", options->camera,
+                   "A name that dtactctl cameras prints, or sim for the simulated sensor "
+                   "(default: the only USB camera)")
+      ->type_name("NAME");
+  command
+      ->add_option("--mode", options->mode,
+                   "Size and rate, as 800x600@60 (default: nearest to that)")
+      ->type_name("WxH@FPS");
+  command
+      ->add_option("--board", options->board,
+                   "Board's configuration whose camera and ring are taken: a file, or a name in "
+                   "/usr/share/doc/dtactd/examples/boards (default: of the board that this is)")
+      ->type_name("NAME");
+  command->add_option("--radius-mm", options->radius_mm, "As of dtact-calibrate guided; else asked")
+      ->type_name("MM");
+  command->add_option("--mm-per-px", options->mm_per_px, "As of dtact-calibrate guided; else asked")
+      ->type_name("MM");
+  command->add_option("--lens", options->lens, "As of dtact-calibrate guided")->type_name("FILE");
+  command->add_option("--crop", options->crop, "As of dtact-calibrate guided")->type_name("W,H");
+  command->callback([&context, options] { Setup(context, *options).run(); });
+}
+
+}  // namespace dtact::ctl

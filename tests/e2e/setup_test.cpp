@@ -1,0 +1,149 @@
+// dtactctl setup on the simulated sensor, with a systemctl of the test's own: from a configuration
+// of another camera to a calibrated service.
+#include <arpa/inet.h>
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+
+#include <algorithm>
+#include <csignal>
+#include <fstream>
+
+#include "hal/base/atomic_file.hpp"
+#include "hal/base/unique_fd.hpp"
+#include "tests/e2e/sensor.hpp"
+
+namespace dtact::e2e {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::Not;
+
+constexpr int kNotMet = 4;
+
+/// A port that nobody listens on.
+std::uint16_t free_port() {
+  const base::UniqueFd fd(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0));
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  socklen_t size = sizeof address;
+  if (::bind(fd.get(), reinterpret_cast<sockaddr*>(&address), size) != 0 ||
+      ::getsockname(fd.get(), reinterpret_cast<sockaddr*>(&address), &size) != 0) {
+    throw std::runtime_error("no free port");
+  }
+  return ntohs(address.sin_port);
+}
+
+/// A machine with a service: its configuration, the programs in one folder, and a systemctl that
+/// starts the daemon anew.
+class Setup : public testing::Test {
+ protected:
+  Setup() {
+    const fs::path bin = folder_.path() / "bin";
+    fs::create_directories(bin);
+    for (const char* program : {DTACTD_PROGRAM, DTACTCTL_PROGRAM, CALIBRATE_PROGRAM}) {
+      fs::create_symlink(program, bin / fs::path(program).filename());
+    }
+    std::string text = base::read_file(DTACT_SOURCE_DIR "/config/dtactd.toml");
+    replace(text, "backend = \"sim\"\nwidth", "backend = \"null\"\nwidth");
+    replace(text, "scene = \"\"",
+            "scene = \"" + scene_file("calibration_presses.toml").string() + "\"");
+    replace(text, "calibration = \"/usr/share/dtactd/simulated\"", "calibration = \"\"");
+    replace(text, "state_dir = \"\"", "state_dir = \"" + file("state").string() + "\"");
+    replace(text, "port = 7377 ", fmt::format("port = {} ", port_));
+    base::write_file_atomically(config(), text);
+    std::ofstream(bin / "systemctl") << fmt::format(
+        "#!/bin/sh\n[ \"$*\" = 'restart dtactd' ] || exit 1\ncd '{0}'\n"
+        "[ ! -e pid ] || kill \"$(cat pid)\"\n"
+        "while [ -e pid ] && kill -0 \"$(cat pid)\" 2>/dev/null; do sleep 0.1; done\n"
+        "dtactd --config '{1}' </dev/null >log 2>&1 &\necho $! >pid\n",
+        folder_.path().string(), config().string());
+    fs::permissions(bin / "systemctl", fs::perms::owner_all);
+  }
+  ~Setup() override {
+    if (fs::exists(file("pid"))) ::kill(std::stoi(base::read_file(file("pid"))), SIGTERM);
+  }
+
+  static void replace(std::string& text, const std::string& from, const std::string& to) {
+    const std::size_t at = text.find(from);
+    if (at == std::string::npos) throw std::runtime_error("no " + from);
+    text.replace(at, from.size(), to);
+  }
+  [[nodiscard]] fs::path file(const std::string& name) const { return folder_.path() / name; }
+  [[nodiscard]] fs::path config() const { return file("dtactd.toml"); }
+
+  /// Runs it in the folder, with these lines typed.
+  int setup(const std::vector<std::string>& arguments, const std::string& typed = "") {
+    std::vector<std::string> command = {"/usr/bin/env",
+                                        "-C",
+                                        folder_.path().string(),
+                                        "PATH=" + file("bin").string() + ":/usr/bin:/bin",
+                                        "dtactctl",
+                                        "--port",
+                                        std::to_string(port_),
+                                        "setup",
+                                        "--config",
+                                        config().string()};
+    command.insert(command.end(), arguments.begin(), arguments.end());
+    return run_program(command, &output_, typed);
+  }
+
+  std::uint16_t port_ = free_port();
+  std::string output_;
+
+ private:
+  TempFolder folder_;
+};
+
+TEST_F(Setup, FromAnotherCameraToDepth) {
+  const std::string before = base::read_file(config());
+  // The radius is asked; what is typed after it is the guided session's.
+  ASSERT_EQ(setup({"--camera", "sim", "--mm-per-px", "0.0413793", "--crop", kCrop},
+                  "4.0\n" + std::string(60, '\n')),
+            0)
+      << output_;
+  EXPECT_THAT(output_,
+              AllOf(HasSubstr("1 of 5: camera\n  camera.backend = \"sim\" (was \"null\")"),
+                    HasSubstr("nothing is wrong"), HasSubstr("the service runs: camera sim:"),
+                    HasSubstr("the daemon uses calibration dtact-calibration from now on"),
+                    HasSubstr(" with depth, ")));
+  std::string expected = before;
+  replace(expected, "backend = \"null\"\nwidth", "backend = \"sim\"\nwidth");
+  EXPECT_EQ(base::read_file(config()), expected);
+
+  // Each step again, alone.
+  EXPECT_EQ(setup({"camera", "--camera", "sim"}), 0) << output_;
+  EXPECT_THAT(output_, AllOf(HasSubstr("has these settings already"), Not(HasSubstr("2 of 5"))));
+  EXPECT_EQ(setup({"check"}), 0) << output_;
+  EXPECT_EQ(setup({"restart", "watch"}), 0) << output_;
+  EXPECT_THAT(output_, AllOf(HasSubstr("3 of 5"), HasSubstr("5 of 5"), Not(HasSubstr("4 of 5"))));
+  // All of them: the calibration stays.
+  EXPECT_EQ(setup({"--camera", "sim"}), 0) << output_;
+  EXPECT_THAT(output_, HasSubstr("is calibrated, by dtact-calibration; dtactctl setup calibrate"));
+}
+
+TEST_F(Setup, StopsWithWhatToDoAndHowToGoOn) {
+  const std::string before = base::read_file(config());
+  EXPECT_EQ(setup({"--camera", "serial:none"}), kNotMet);
+  EXPECT_THAT(output_, AllOf(HasSubstr("no camera serial:none is attached"),
+                             HasSubstr("then go on: dtactctl setup camera check restart calibrate "
+                                       "watch")));
+  std::ofstream(file("board.toml")) << "[camera]\nbackend = \"libcamera\"\nwidth = 1\n";
+  EXPECT_EQ(setup({"camera", "--board", file("board.toml").string()}), kNotMet);
+  EXPECT_THAT(output_, AllOf(HasSubstr("camera.width"), HasSubstr("nothing is written")));
+  EXPECT_EQ(base::read_file(config()), before);
+  EXPECT_FALSE(fs::exists(file("dtactd.toml.new")));
+  EXPECT_EQ(setup({"restart", "--unit", "dtactd@none"}), kNotMet);
+  EXPECT_THAT(output_, HasSubstr("the service does not start: systemctl status dtactd@none"));
+  EXPECT_EQ(setup({"calibrate"}), kNotMet);
+  EXPECT_THAT(output_, HasSubstr("give --radius-mm, and --mm-per-px or --lens"));
+  EXPECT_EQ(setup({"guess"}), 2);
+}
+
+}  // namespace
+}  // namespace dtact::e2e
