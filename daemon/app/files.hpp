@@ -5,6 +5,7 @@
 
 #include "daemon/app/config.hpp"
 #include "daemon/serve/net_config.hpp"
+#include "hal/base/unique_fd.hpp"
 
 namespace dtact::app {
 
@@ -14,6 +15,11 @@ void check_readable(const std::string& key, const std::filesystem::path& path);
 
 /// The same of what the camera that is configured reads: a scene, a recording.
 void check_camera_files(const hal::CameraConfig& camera);
+
+/// Makes this process, the sensor `name`'s, the owner of the state folder as long as the descriptor
+/// lives. Throws std::runtime_error, naming the present owner and the fix, where it has one.
+[[nodiscard]] base::UniqueFd own_state_folder(const std::filesystem::path& folder,
+                                              const std::string& name);
 
 /// Puts the file that systemd handed in where certificate, key and token file are
 /// "credential:NAME". Throws as resolve_credential().

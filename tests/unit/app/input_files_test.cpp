@@ -1,11 +1,14 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <cstdlib>
+#include <filesystem>
 #include <functional>
 #include <stdexcept>
 
 #include "daemon/app/files.hpp"
+#include "tests/fakes/own_path.hpp"
 
 namespace dtact::app {
 namespace {
@@ -51,6 +54,22 @@ TEST(InputFiles, OnlyTheCameraThatIsConfiguredReadsSome) {
   EXPECT_EQ(said(), "no error");
   camera.replay.folder = "/no/such/press.mcap";
   EXPECT_THAT(said(), AllOf(StartsWith("camera.replay.folder = "), Not(HasSubstr("service"))));
+}
+
+TEST(StateFolder, HasOneOwnerWhoIsNamed) {
+  const std::filesystem::path folder = fakes::own_path("state");
+  std::filesystem::create_directories(folder);
+  base::UniqueFd left = own_state_folder(folder, "left");
+  const std::string refused = error([&] { (void)own_state_folder(folder, "right"); });
+  EXPECT_THAT(refused,
+              StartsWith("the state folder " + folder.string() + " belongs to dtactd, process " +
+                         std::to_string(::getpid()) + ", sensor \"left\": "));
+  EXPECT_THAT(refused, HasSubstr("state_dir"));
+  left.reset();
+  EXPECT_TRUE(own_state_folder(folder, "right"));
+  EXPECT_THAT(error([&] { (void)own_state_folder(folder / "no", "left"); }),
+              HasSubstr("state_dir"));
+  std::filesystem::remove_all(folder);
 }
 
 }  // namespace
