@@ -15,6 +15,7 @@
 #include "daemon/app/config_keys.hpp"
 #include "daemon/serve/security.hpp"
 #include "hal/base/atomic_file.hpp"
+#include "hal/files/key_reader.hpp"
 
 namespace dtact::app {
 namespace {
@@ -80,15 +81,6 @@ class Assembly {
   std::vector<KeyOrigin> origins_;
 };
 
-toml::table parse(std::string_view text, const std::string& name) {
-  try {
-    return toml::parse(text, name);
-  } catch (const toml::parse_error& e) {
-    throw std::runtime_error(
-        fmt::format("{}:{}: not valid TOML: {}", name, e.source().begin.line, e.description()));
-  }
-}
-
 /// "key=value" as TOML. A value that is no TOML by itself is taken as a string, so that
 /// `camera.backend=replay` needs no quotes within the shell's.
 toml::table parse_setting(const std::string& setting) {
@@ -99,15 +91,16 @@ toml::table parse_setting(const std::string& setting) {
   }
   const std::string key = setting.substr(0, equals);
   const std::string value = setting.substr(equals + 1);
+  const std::string where = "--set " + setting;
   try {
-    return toml::parse(fmt::format("{} = {}", key, value));
-  } catch (const toml::parse_error&) {
+    return tomlfile::parse(fmt::format("{} = {}", key, value), where);
+  } catch (const std::runtime_error&) {
     const toml::value<std::string> text(value);
     toml::table line;
     line.insert("text", text);
     std::ostringstream quoted;
     quoted << toml::toml_formatter(line);
-    return parse(key + quoted.str().substr(std::string_view("text").size()), "--set " + setting);
+    return tomlfile::parse(key + quoted.str().substr(std::string_view("text").size()), where);
   }
 }
 
@@ -140,7 +133,7 @@ LoadedConfig load_config(const std::optional<fs::path>& file,
   Assembly assembly(loaded.config);
   if (file) {
     const std::string name = file->string();
-    const toml::table table = parse(base::read_file(*file), name);
+    const toml::table table = tomlfile::parse(base::read_file(*file), name);
     assembly.take(table, "", fs::absolute(*file).parent_path(),
                   [&](unsigned line) { return fmt::format("{}:{}", name, line); });
   }

@@ -36,6 +36,7 @@
 #include "hal/base/clock.hpp"
 #include "hal/base/cpu_claim.hpp"
 #include "hal/base/rt_thread.hpp"
+#include "hal/base/unique_fd.hpp"
 #include "hal/registry.hpp"
 #include "version.hpp"
 
@@ -59,9 +60,25 @@ fs::path make_state_folder(const Config& config) {
   return folder;
 }
 
-/// The calibration to start with; null when there is none, or none that can be read.
+/// Says that the current calibration is not used, which it names, and what to do.
+std::string passed_over(const net::FolderCalibrationStore& store, bool configured) {
+  const fs::path folder = store.current();
+  const std::string number =
+      store.current_number() ? std::to_string(*store.current_number()) : folder.string();
+  return fmt::format(
+      "Calibration {0} ({1}) is not used: {2} starts with it ended early. The daemon runs with "
+      "{3}. "
+      "`dtactctl calibration download {0}` saves it, `dtactctl calibration activate` takes another "
+      "one or tries it again.",
+      number, folder.filename().string(), net::FolderCalibrationStore::kMaxFailedStarts,
+      configured ? "the configured calibration" : "no calibration");
+}
+
+/// The calibration to start with; null when there is none, or none that can be read. `note`
+/// becomes what the status is to say of that.
 std::shared_ptr<const calibration::Calibration> load_calibration(const fs::path& folder,
-                                                                 const Config& config) {
+                                                                 const Config& config,
+                                                                 std::string& note) {
   if (folder.empty()) {
     spdlog::warn(
         "no calibration: serving the camera's image only. Make one with `dtact-calibrate depth`"
@@ -78,11 +95,27 @@ std::shared_ptr<const calibration::Calibration> load_calibration(const fs::path&
     // What the configuration names is fixed there. An uploaded one can be replaced only by a
     // daemon that runs.
     if (is_configured) throw;
-    spdlog::warn(
+    note = fmt::format(
         "{}; serving the camera's image only: `dtactctl calibration list` shows the others and "
         "`dtactctl calibration activate` takes one of them",
         e.what());
+    spdlog::warn("{}", note);
     return nullptr;
+  }
+}
+
+/// The pipeline with all its tables: the end of what counts as a start with the calibration.
+std::unique_ptr<pipeline::Pipeline> make_pipeline(
+    hal::Devices devices, const std::shared_ptr<const calibration::Calibration>& calibration,
+    const pipeline::PipelineConfig& settings, net::FolderCalibrationStore& store) {
+  try {
+    auto pipeline = std::make_unique<pipeline::Pipeline>(
+        std::move(devices.camera), std::move(devices.ring), calibration, settings);
+    store.end_start();
+    return pipeline;
+  } catch (const std::invalid_argument&) {
+    store.end_start();  // it is the camera that does not do
+    throw;
   }
 }
 
@@ -174,9 +207,8 @@ void run_daemon(const Config& config, const std::function<Config()>& load) {
   net::NetConfig net = make_net_config(config);
   name_sensor(net.name);
   const fs::path state = make_state_folder(config);
+  const base::UniqueFd owned = own_state_folder(state, net.name);
   net::FolderCalibrationStore store(state, calibration_folder(config));
-  auto calibration = load_calibration(store.current(), config);
-  const bool uncalibrated = calibration == nullptr;
 
   check_camera_files(config.hal.camera);
   hal::Devices devices = hal::open_devices(config.hal);
@@ -193,8 +225,18 @@ void run_daemon(const Config& config, const std::function<Config()>& load) {
   if (config.hal.ring.backend.starts_with("ws2812")) {
     settings.light.gamma = config.hal.ring.ws2812.gamma;
   }
-  pipeline::Pipeline pipeline(std::move(devices.camera), std::move(devices.ring), calibration,
-                              settings);
+  // From here until the pipeline has its tables, an end of this process counts as the
+  // calibration's.
+  fs::path folder = store.current();
+  if (!store.begin_start()) {
+    folder = calibration_folder(config);
+    settings.calibration_note = passed_over(store, !folder.empty());
+    spdlog::warn("{}", settings.calibration_note);
+  }
+  auto calibration = load_calibration(folder, config, settings.calibration_note);
+  const bool uncalibrated = calibration == nullptr;
+  const auto made = make_pipeline(std::move(devices), calibration, settings, store);
+  pipeline::Pipeline& pipeline = *made;
   calibration.reset();  // its megabytes go when another one comes into use
   if (net.fifo_priority > 0) {
     net.realtime_refused = base::make_fifo("network", net.fifo_priority).value_or("");

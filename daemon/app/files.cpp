@@ -1,18 +1,22 @@
 #include "daemon/app/files.hpp"
 
+#include <fcntl.h>
 #include <fmt/format.h>
+#include <sys/file.h>
 #include <unistd.h>
 
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
 #include <stdexcept>
+#include <system_error>
 
 #include "daemon/app/config.hpp"
 #include "daemon/app/service.hpp"
 #include "daemon/serve/admission.hpp"
 #include "daemon/serve/security.hpp"
 #include "daemon/serve/tls.hpp"
+#include "hal/base/atomic_file.hpp"
 #include "hal/registry.hpp"
 
 namespace dtact::app {
@@ -51,6 +55,36 @@ std::filesystem::path calibration_folder(const Config& config) {
 void check_calibration(const Config& config) {
   const char* const key = config.calibration.empty() ? "camera.sim.calibration" : "calibration";
   check_readable(key, calibration_folder(config));
+}
+
+base::UniqueFd own_state_folder(const std::filesystem::path& folder, const std::string& name) {
+  // The lock is on the folder, so that it needs no room; the file is for people only.
+  const std::filesystem::path file = folder / ".owner";
+  base::UniqueFd fd(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  if (fd && ::flock(fd.get(), LOCK_EX | LOCK_NB) == 0) {
+    try {
+      base::write_file_atomically(
+          file, fmt::format("dtactd, process {}, sensor \"{}\"\n", ::getpid(), name));
+    } catch (const std::system_error&) {
+      std::error_code ignored;
+      std::filesystem::remove(file, ignored);  // it names another one
+    }
+    return fd;
+  }
+  const int error = errno;
+  if (!fd || error != EWOULDBLOCK) {
+    throw std::runtime_error(
+        fmt::format("cannot lock the state folder {} ({}): set state_dir to a folder of this "
+                    "machine that this user may read",
+                    folder.string(), std::strerror(error)));
+  }
+  std::error_code ignored;
+  std::string owner = std::filesystem::exists(file, ignored) ? base::read_file(file, 4096) : "";
+  owner = owner.substr(0, owner.find('\n'));
+  throw std::runtime_error(fmt::format(
+      "the state folder {} belongs to {}: end it, or set state_dir to a folder of this sensor's "
+      "own",
+      folder.string(), owner.empty() ? "another dtactd that runs" : owner));
 }
 
 void resolve_credentials(net::NetConfig& config) {

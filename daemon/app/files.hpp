@@ -5,6 +5,7 @@
 
 #include "daemon/app/config.hpp"
 #include "daemon/serve/net_config.hpp"
+#include "hal/base/unique_fd.hpp"
 
 namespace dtact::app {
 
@@ -22,6 +23,11 @@ void check_camera(const hal::CameraConfig& camera);
 [[nodiscard]] std::filesystem::path calibration_folder(const Config& config);
 /// check_readable() of that folder, by the key that names it.
 void check_calibration(const Config& config);
+
+/// Makes this process, the sensor `name`'s, the owner of the state folder as long as the descriptor
+/// lives. Throws std::runtime_error, naming the present owner and the fix, where it has one.
+[[nodiscard]] base::UniqueFd own_state_folder(const std::filesystem::path& folder,
+                                              const std::string& name);
 
 /// Puts the file that systemd handed in where certificate, key and token file are
 /// "credential:NAME". Throws as resolve_credential().

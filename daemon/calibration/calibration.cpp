@@ -14,7 +14,7 @@ namespace dtact::calibration {
 
 namespace fs = std::filesystem;
 
-Calibration load(const fs::path& folder) {
+Calibration load(const fs::path& folder, const std::optional<FrameSize>& camera) {
   if (!fs::is_directory(folder)) {
     throw std::runtime_error(folder.string() +
                              ": no such folder; make a calibration with dtact-calibrate depth");
@@ -22,7 +22,7 @@ Calibration load(const fs::path& folder) {
   const fs::path toml = folder / kTomlName;
   const std::string text = base::read_file(toml);
   const std::string reference = base::read_file(folder / kReferenceName);
-  Calibration calibration = parse(text, reference, toml.string());
+  Calibration calibration = parse(text, reference, toml.string(), camera);
   calibration.name = fs::weakly_canonical(folder).filename().string();
   return calibration;
 }

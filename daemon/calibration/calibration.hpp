@@ -70,18 +70,27 @@ struct Calibration {
   Origin origin;
 };
 
-/// Reads and checks a calibration folder. Throws std::runtime_error with file, line, key and
-/// fix.
-[[nodiscard]] Calibration load(const std::filesystem::path& folder);
+/// The size of a camera's frames, pixels.
+struct FrameSize {
+  int width = 0;
+  int height = 0;
+};
+
+/// Reads and checks a calibration folder, as parse(). Throws std::runtime_error with file, line,
+/// key and fix.
+[[nodiscard]] Calibration load(const std::filesystem::path& folder,
+                               const std::optional<FrameSize>& camera = {});
 
 /// Writes the folder so that at any moment it is either absent, the old one or the new one. Throws
 /// std::runtime_error, also when the folder holds files that no calibration has.
 void save(const Calibration& calibration, const std::filesystem::path& folder);
 
 /// The two files' contents checked and taken apart without a folder (an upload). `where` names the
-/// origin in error messages; the calibration's name is left empty.
+/// origin in error messages; the calibration's name is left empty. With `camera`, a calibration for
+/// frames of another size is refused before anything of that size is made.
 [[nodiscard]] Calibration parse(const std::string& toml, const std::string& reference_png,
-                                const std::string& where);
+                                const std::string& where,
+                                const std::optional<FrameSize>& camera = {});
 
 /// The rectification of a depth map: through the lens, or the crop where there is none. `outside`
 /// becomes depth-map sized with 1 where the frame does not show the pixel, or empty. Throws

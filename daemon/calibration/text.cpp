@@ -88,12 +88,17 @@ void read_reference(tomlfile::KeyReader reader, const std::string& png, const st
                                       "folder again or calibrate again",
                                       kReferenceName, where));
   }
-  image::Grey16 image = image::decode_png_grey16(png, kReferenceName);
-  if (image.width != model.rectify.frame_width || image.height != model.rectify.frame_height) {
+  const image::PngHeader header = image::png_header(png, kReferenceName);
+  if (header.width != model.rectify.frame_width || header.height != model.rectify.frame_height) {
     reader.fail("",
-                fmt::format("{} is {}x{} but frame says {}x{}", kReferenceName, image.width,
-                            image.height, model.rectify.frame_width, model.rectify.frame_height));
+                fmt::format("{} is {}x{} but frame says {}x{}", kReferenceName, header.width,
+                            header.height, model.rectify.frame_width, model.rectify.frame_height));
   }
+  if (header.bits != 16 || !header.grey) {
+    reader.fail("",
+                fmt::format("{} is not 16-bit grey; copy the whole folder again", kReferenceName));
+  }
+  image::Grey16 image = image::decode_png_grey16(png, kReferenceName);
   if (std::ranges::max(image.pixels) > 255 * 256) {
     reader.fail(
         "", fmt::format("{} has values above 65280 (grey level 255 times 256)", kReferenceName));
@@ -159,7 +164,7 @@ Files format(const Calibration& calibration) {
 }
 
 Calibration parse(const std::string& toml, const std::string& reference_png,
-                  const std::string& where) {
+                  const std::string& where, const std::optional<FrameSize>& camera) {
   const toml::table document = tomlfile::parse(toml, where);
   tomlfile::KeyReader top(document, where);
   // Before anything else: another version's keys mean something else.
@@ -183,6 +188,12 @@ Calibration parse(const std::string& toml, const std::string& reference_png,
   const int frame_width = small(frame, "width", 2, kMaxPixels);
   const int frame_height = small(frame, "height", 2, kMaxPixels);
   frame.finish();
+  if (camera && (camera->width != frame_width || camera->height != frame_height)) {
+    top.fail("frame", fmt::format("is for frames of {}x{} pixels, the camera delivers {}x{}: set "
+                                  "camera.width and camera.height to the calibration's, or "
+                                  "calibrate in this mode",
+                                  frame_width, frame_height, camera->width, camera->height));
+  }
   check_area(frame, frame_width, frame_height, kMaxFramePixels);
   tomlfile::KeyReader crop = top.table("crop");
   calibration.crop_col = small(crop, "col", 0, frame_width - 1);

@@ -11,6 +11,7 @@
 #include "daemon/net/hub.hpp"
 #include "daemon/net/messages.hpp"
 #include "daemon/net/reconstruction_names.hpp"
+#include "hal/base/free_memory.hpp"
 #include "hal/base/utf8.hpp"
 #include "hal/files/png.hpp"
 #include "proto/dtact.pb.h"
@@ -66,7 +67,7 @@ CalibrationCommands::CalibrationCommands(asio::io_context& io, asio::thread_pool
       hub_(hub),
       port_(port),
       store_(store),
-      in_use_(store.current_number()) {
+      in_use_(store.started_number()) {
   if (in_use_) hub_.number_calibration(0, *in_use_);  // the pipeline's key of the first
 }
 
@@ -92,6 +93,7 @@ void CalibrationCommands::get(const Requester& requester, const v1::GetCalibrati
         "depth and send it with dtactctl calibration upload, or take one "
         "that dtactctl calibration list shows");
   }
+  if (!number) number = in_use_;
   if (reading_ >= kMaxReading)
     return requester.first->reply_error(requester.second, v1::ERROR_BUSY, kBusy);
   ++reading_;
@@ -178,13 +180,17 @@ void CalibrationCommands::activate(const Requester& requester,
 void CalibrationCommands::change(const Requester& requester, Change change) {
   changing_ = true;
   using Ready = pipeline::UseCalibration;
+  const pipeline::Status now = port_.status();
+  const calibration::FrameSize camera{now.camera.width, now.camera.height};
   on_worker(
-      [&store = store_, &port = port_, change, rules = port_.status().reconstruction] {
-        return attempt<Ready>(v1::ERROR_INVALID, [&] {
-          return port.prepare(
-              change.upload != nullptr ? store.check(*change.upload) : store.load(change.number),
-              rules);
+      [&store = store_, &port = port_, change, rules = now.reconstruction, camera] {
+        auto ready = attempt<Ready>(v1::ERROR_INVALID, [&] {
+          return port.prepare(change.upload != nullptr ? store.check(*change.upload, camera)
+                                                       : store.load(change.number, camera),
+                              rules);
         });
+        base::release_free_memory();  // a parsed file is many small pieces
+        return ready;
       },
       [requester, change](CalibrationCommands& self, Outcome<Ready> ready) mutable {
         if (ready.failed()) {

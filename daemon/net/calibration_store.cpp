@@ -7,11 +7,13 @@
 #include <algorithm>
 #include <cerrno>
 #include <charconv>
+#include <fstream>
 #include <string_view>
 #include <system_error>
 #include <utility>
 
 #include "hal/base/atomic_file.hpp"
+#include "hal/files/key_reader.hpp"
 
 namespace dtact::net {
 namespace {
@@ -25,6 +27,8 @@ constexpr const char* kFresh = ".new";
 constexpr const char* kStale = ".old";
 constexpr const char* kToml = "calibration.toml";
 constexpr const char* kPng = "reference.png";
+constexpr const char* kAccepted = "accepted.toml";
+constexpr const char* kStarts = "calibration.starts";
 
 /// "17" → 17. Nothing for whatever else lies in the folder.
 std::optional<std::uint64_t> number_of(const fs::path& folder) {
@@ -53,6 +57,7 @@ void move_link(const fs::path& state, const fs::path& target) {
   fs::remove(fresh);
   fs::create_directory_symlink(target, fresh);
   fs::rename(fresh, state / kLink);
+  fs::remove(state / kStarts);  // they were of the one before
   base::sync_folder(state);
 }
 
@@ -70,24 +75,6 @@ void remove_old(const fs::path& folders, const std::vector<std::uint64_t>& neede
     fs::rename(folders / std::to_string(number), stale, ignored);
     fs::remove_all(stale, ignored);
   }
-}
-
-/// Writes FOLDERS/NUMBER/NAME so that a power cut leaves either all of it or nothing with a number.
-void write_folder(const fs::path& folders, std::uint64_t number, const CalibrationFiles& files) {
-  const fs::path fresh = folders / kFresh;
-  fs::remove_all(fresh);
-  try {
-    fs::create_directories(fresh / files.name);
-    base::write_file_atomically(fresh / files.name / kToml, files.toml);
-    base::write_file_atomically(fresh / files.name / kPng, files.png);
-    base::sync_folder(fresh);
-    fs::rename(fresh, folders / std::to_string(number));
-  } catch (...) {
-    std::error_code ignored;
-    fs::remove_all(fresh, ignored);
-    throw;
-  }
-  base::sync_folder(folders);
 }
 
 /// When a number's folder got its content: it is never written again, only renamed.
@@ -147,11 +134,69 @@ std::optional<std::uint64_t> FolderCalibrationStore::current_number() const {
   return numbered.parent_path() == kFolders ? number_of(numbered) : std::nullopt;
 }
 
+std::optional<std::uint64_t> FolderCalibrationStore::started_number() const {
+  if (!passed_over_) return current_number();
+  return configured_.empty() ? std::nullopt : std::optional(kConfiguredCalibration);
+}
+
+bool FolderCalibrationStore::begin_start() {
+  std::error_code error;
+  const std::string target = fs::read_symlink(state_ / kLink, error).string();
+  if (error || target.empty()) return true;
+  int begun = 0;  // before this one, with the same calibration
+  std::ifstream file(state_ / kStarts);
+  std::string of;
+  if (!(std::getline(file, of) && of == target && file >> begun)) begun = 0;
+  passed_over_ = begun >= kMaxFailedStarts;
+  if (passed_over_) return false;
+  try {
+    base::write_file_atomically(state_ / kStarts, fmt::format("{}\n{}\n", target, begun + 1));
+  } catch (const std::system_error&) {  // NOLINT(bugprone-empty-catch)
+    // A full disk is no reason not to start: then this one is not counted.
+  }
+  return true;
+}
+
+void FolderCalibrationStore::end_start() {
+  std::error_code ignored;  // one too many was counted then
+  if (!passed_over_) fs::remove(state_ / kStarts, ignored);
+}
+
+FolderCalibrationStore::Digests FolderCalibrationStore::digests_of(const CalibrationFiles& files) {
+  return {calibration::sha256_hex(files.toml), calibration::sha256_hex(files.png)};
+}
+
 std::shared_ptr<const calibration::Calibration> FolderCalibrationStore::check(
-    const CalibrationFiles& files) {
-  auto parsed = calibration::parse(files.toml, files.png, "upload " + files.name);
+    const CalibrationFiles& files, const std::optional<calibration::FrameSize>& camera) {
+  auto parsed = calibration::parse(files.toml, files.png, "upload " + files.name, camera);
   parsed.name = files.name;
+  accepted_ = {digests_of(files), summarise(parsed)};
   return std::make_shared<const calibration::Calibration>(std::move(parsed));
+}
+
+void FolderCalibrationStore::write_folder(const fs::path& folders, std::uint64_t number,
+                                          const CalibrationFiles& files) const {
+  const fs::path fresh = folders / kFresh;
+  fs::remove_all(fresh);
+  try {
+    fs::create_directories(fresh / files.name);
+    base::write_file_atomically(fresh / files.name / kToml, files.toml);
+    base::write_file_atomically(fresh / files.name / kPng, files.png);
+    if (accepted_.digests == digests_of(files)) {
+      base::write_file_atomically(
+          fresh / kAccepted,
+          fmt::format("# What dtactd found in the calibration of these digests.\n"
+                      "toml_sha256 = \"{}\"\npng_sha256 = \"{}\"\n{}",
+                      accepted_.digests.toml, accepted_.digests.png, format(accepted_.summary)));
+    }
+    base::sync_folder(fresh);
+    fs::rename(fresh, folders / std::to_string(number));
+  } catch (...) {
+    std::error_code ignored;
+    fs::remove_all(fresh, ignored);
+    throw;
+  }
+  base::sync_folder(folders);
 }
 
 std::uint64_t FolderCalibrationStore::keep(const CalibrationFiles& files) {
@@ -206,6 +251,24 @@ FolderCalibrationStore::Stamp FolderCalibrationStore::stamp_of(const fs::path& f
           .changed_ns = ns_of(about.st_ctim)};
 }
 
+std::optional<CalibrationSummary> FolderCalibrationStore::accepted_summary(const fs::path& folder) {
+  const fs::path record = folder.parent_path() / kAccepted;
+  if (!fs::exists(record)) return std::nullopt;
+  try {
+    const toml::table document = tomlfile::parse(base::read_file(record), record.string());
+    tomlfile::KeyReader reader(document, record.string());
+    const Digests digests{reader.text("toml_sha256"), reader.text("png_sha256")};
+    CalibrationSummary summary = read_summary(reader, name_of(folder));
+    reader.finish();
+    const CalibrationFiles files{
+        .name = {}, .toml = base::read_file(folder / kToml), .png = base::read_file(folder / kPng)};
+    if (digests == digests_of(files)) return summary;
+  } catch (const std::exception&) {  // NOLINT(bugprone-empty-catch)
+    // Then the calibration itself is read, and says what is wrong.
+  }
+  return std::nullopt;
+}
+
 CalibrationSummary FolderCalibrationStore::summary_of(std::uint64_t number,
                                                       const fs::path& folder) {
   // Taken before the files are read: one that changes meanwhile is read again the next time.
@@ -215,13 +278,17 @@ CalibrationSummary FolderCalibrationStore::summary_of(std::uint64_t number,
     return found->second.summary;
   }
   known_.erase(number);
-  const CalibrationSummary summary = summarise(calibration::load(folder));
+  auto accepted = number == kConfiguredCalibration ? std::nullopt : accepted_summary(folder);
+  const CalibrationSummary summary =
+      accepted ? std::move(*accepted) : summarise(calibration::load(folder));
   known_.emplace(number, Known{folder, now, summary});
   return summary;
 }
 
-std::shared_ptr<const calibration::Calibration> FolderCalibrationStore::load(std::uint64_t number) {
-  return std::make_shared<const calibration::Calibration>(calibration::load(folder_of(number)));
+std::shared_ptr<const calibration::Calibration> FolderCalibrationStore::load(
+    std::uint64_t number, const std::optional<calibration::FrameSize>& camera) {
+  return std::make_shared<const calibration::Calibration>(
+      calibration::load(folder_of(number), camera));
 }
 
 void FolderCalibrationStore::make_current(std::uint64_t number) {
@@ -231,6 +298,7 @@ void FolderCalibrationStore::make_current(std::uint64_t number) {
                      fs::path(kFolders) / folder.parent_path().filename() / folder.filename());
   }
   fs::remove(state_ / kLink);
+  fs::remove(state_ / kStarts);
   base::sync_folder(state_);
 }
 

@@ -52,22 +52,28 @@ class CalibrationStore {
   CalibrationStore& operator=(const CalibrationStore&) = delete;
   virtual ~CalibrationStore() = default;
 
-  /// The files as a calibration. Changes nothing. Throws std::runtime_error naming file, line, key
-  /// and fix.
+  /// The files as a calibration. Changes nothing of what is kept. Refuses one for other frames than
+  /// `camera`'s before anything of their size is made. Throws std::runtime_error naming file, line,
+  /// key and fix.
   [[nodiscard]] virtual std::shared_ptr<const calibration::Calibration> check(
-      const CalibrationFiles& files) = 0;
+      const CalibrationFiles& files, const std::optional<calibration::FrameSize>& camera) = 0;
   /// Stores checked files under a new number, which it returns, and makes them current.
   virtual std::uint64_t keep(const CalibrationFiles& files) = 0;
   /// All there are: the configured one, then by number. Each is read and checked before it is
-  /// listed for the first time, and again when its files have changed.
+  /// listed for the first time, unless its files are those that check() accepted, and again when
+  /// they have changed.
   [[nodiscard]] virtual std::vector<StoredCalibration> list() = 0;
   /// One, read and checked. Throws as check() does.
   [[nodiscard]] virtual std::shared_ptr<const calibration::Calibration> load(
-      std::uint64_t number) = 0;
+      std::uint64_t number, const std::optional<calibration::FrameSize>& camera) = 0;
   /// Makes one current.
   virtual void make_current(std::uint64_t number) = 0;
   /// Nothing when there is none, or when the current one has no number. Throws nothing.
   [[nodiscard]] virtual std::optional<std::uint64_t> current_number() const = 0;
+  /// The one that the daemon started with: the current one, unless that had to be passed over.
+  [[nodiscard]] virtual std::optional<std::uint64_t> started_number() const {
+    return current_number();
+  }
   /// The files of one, unchecked; without a number, of the current one.
   [[nodiscard]] virtual CalibrationFiles read(std::optional<std::uint64_t> number) = 0;
 };
@@ -75,8 +81,10 @@ class CalibrationStore {
 /// Keeps calibrations in the state directory:
 ///
 ///     STATE/calibrations/1/ball/calibration.toml, reference.png
+///     STATE/calibrations/1/accepted.toml                          their digests and summary
 ///     STATE/calibrations/2/ball/…                                 the current one
 ///     STATE/calibration → calibrations/2/ball
+///     STATE/calibration.starts                                    while a start is under way
 ///
 /// Without the link the configured folder is current. A number's folder is written and synced as a
 /// whole beside the others and renamed into place; then the link moves by a rename. So at
@@ -87,6 +95,9 @@ class FolderCalibrationStore : public CalibrationStore {
   /// it. About 0.5 MB each at 800×600.
   static constexpr std::size_t kKept = 20;
 
+  /// Starts in a row that may end while they read the current uploaded calibration.
+  static constexpr int kMaxFailedStarts = 3;
+
   /// `state`: an existing folder. `configured`: a calibration folder, or empty for none.
   FolderCalibrationStore(std::filesystem::path state, std::filesystem::path configured);
 
@@ -94,14 +105,23 @@ class FolderCalibrationStore : public CalibrationStore {
   /// configured one. Empty when there is none.
   [[nodiscard]] std::filesystem::path current() const;
 
+  /// Notes that a start is about to read the current uploaded calibration. False: kMaxFailedStarts
+  /// of them did not come to end_start(), so this one has to do without it, and started_number() is
+  /// the configured one's. So it stays until another one, or the same again, becomes current.
+  [[nodiscard]] bool begin_start();
+  /// What could end the daemon because of its calibration is done.
+  void end_start();
+
   [[nodiscard]] std::shared_ptr<const calibration::Calibration> check(
-      const CalibrationFiles& files) override;
+      const CalibrationFiles& files, const std::optional<calibration::FrameSize>& camera) override;
   std::uint64_t keep(const CalibrationFiles& files) override;
   [[nodiscard]] std::vector<StoredCalibration> list() override;
-  [[nodiscard]] std::shared_ptr<const calibration::Calibration> load(std::uint64_t number) override;
+  [[nodiscard]] std::shared_ptr<const calibration::Calibration> load(
+      std::uint64_t number, const std::optional<calibration::FrameSize>& camera) override;
   void make_current(std::uint64_t number) override;
   /// Nothing also when the link leads elsewhere.
   [[nodiscard]] std::optional<std::uint64_t> current_number() const override;
+  [[nodiscard]] std::optional<std::uint64_t> started_number() const override;
   [[nodiscard]] CalibrationFiles read(std::optional<std::uint64_t> number) override;
 
  private:
@@ -114,6 +134,17 @@ class FolderCalibrationStore : public CalibrationStore {
     bool operator==(const Stamp&) const = default;
   };
   using Stamps = std::array<Stamp, 2>;  ///< for the two files of a calibration
+  /// SHA-256 of the two files of a calibration.
+  struct Digests {
+    std::string toml;
+    std::string png;
+    bool operator==(const Digests&) const = default;
+  };
+  /// What check() accepted last.
+  struct Accepted {
+    Digests digests;
+    CalibrationSummary summary;
+  };
   /// A calibration that list() has read without error.
   struct Known {
     std::filesystem::path folder;
@@ -121,6 +152,13 @@ class FolderCalibrationStore : public CalibrationStore {
     CalibrationSummary summary;
   };
 
+  [[nodiscard]] static Digests digests_of(const CalibrationFiles& files);
+  /// The summary beside the folder, if check() accepted just these files.
+  [[nodiscard]] static std::optional<CalibrationSummary> accepted_summary(
+      const std::filesystem::path& folder);
+  /// Writes FOLDERS/NUMBER so that a power cut leaves either all of it or nothing with a number.
+  void write_folder(const std::filesystem::path& folders, std::uint64_t number,
+                    const CalibrationFiles& files) const;
   [[nodiscard]] static Stamp stamp_of(const std::filesystem::path& file);
   /// STATE/calibrations/NUMBER/NAME of an uploaded one, or the configured folder.
   [[nodiscard]] std::filesystem::path folder_of(std::uint64_t number) const;
@@ -131,6 +169,8 @@ class FolderCalibrationStore : public CalibrationStore {
   std::filesystem::path state_;
   std::filesystem::path configured_;
   std::map<std::uint64_t, Known> known_;
+  Accepted accepted_;
+  bool passed_over_ = false;  ///< The current one, by this start.
 };
 
 }  // namespace dtact::net

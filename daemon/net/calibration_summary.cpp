@@ -1,7 +1,13 @@
 #include "daemon/net/calibration_summary.hpp"
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
 #include <algorithm>
+#include <climits>
 #include <cstddef>
+#include <cstdint>
+#include <utility>
 
 #include "daemon/recon/reconstructor.hpp"
 
@@ -27,6 +33,38 @@ CalibrationSummary summarise(const calibration::Calibration& calibration) {
   summary.frame_width = model.rectify.frame_width;
   summary.frame_height = model.rectify.frame_height;
   summary.sharpen_steps = recon::sharpening_steps(model);
+  return summary;
+}
+
+std::string format(const CalibrationSummary& summary) {
+  return fmt::format(
+      "method = {}\nmm_per_px = {}\nwidth = {}\nheight = {}\ncovered_from_mm = {}\n"
+      "covered_to_mm = {}\ncreated = {}\nframe_width = {}\nframe_height = {}\n"
+      "sharpen_steps = [{}]\n",
+      tomlfile::quoted(summary.method), summary.mm_per_px, summary.width, summary.height,
+      summary.covered_from_mm, summary.covered_to_mm, tomlfile::quoted(summary.created),
+      summary.frame_width, summary.frame_height, fmt::join(summary.sharpen_steps, ", "));
+}
+
+CalibrationSummary read_summary(tomlfile::KeyReader& reader, std::string name) {
+  constexpr double kAnyMm = 1e6;
+  const auto integer = [&](const char* key) {
+    return static_cast<int>(reader.integer(key, 0, INT_MAX));
+  };
+  CalibrationSummary summary;
+  summary.name = std::move(name);
+  summary.method = reader.text("method");
+  summary.mm_per_px = reader.number("mm_per_px", 0, kAnyMm);
+  summary.width = integer("width");
+  summary.height = integer("height");
+  summary.covered_from_mm = reader.number("covered_from_mm", -kAnyMm, kAnyMm);
+  summary.covered_to_mm = reader.number("covered_to_mm", -kAnyMm, kAnyMm);
+  summary.created = reader.text("created");
+  summary.frame_width = integer("frame_width");
+  summary.frame_height = integer("frame_height");
+  for (const std::int64_t steps : reader.integers("sharpen_steps", 0, INT_MAX)) {
+    summary.sharpen_steps.push_back(static_cast<int>(steps));
+  }
   return summary;
 }
 

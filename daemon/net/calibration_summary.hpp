@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "daemon/calibration/calibration.hpp"
+#include "hal/files/key_reader.hpp"
 
 namespace dtact::net {
 
@@ -25,5 +26,10 @@ struct CalibrationSummary {
 
 /// Without a model only name and time.
 [[nodiscard]] CalibrationSummary summarise(const calibration::Calibration& calibration);
+
+/// A summary as the keys of a TOML file, without its name.
+[[nodiscard]] std::string format(const CalibrationSummary& summary);
+/// Takes the keys that format() writes. Throws as KeyReader.
+[[nodiscard]] CalibrationSummary read_summary(tomlfile::KeyReader& reader, std::string name);
 
 }  // namespace dtact::net

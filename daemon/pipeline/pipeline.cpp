@@ -153,6 +153,7 @@ void Pipeline::finish(CommandDone& done) {
   if (const auto* use = std::get_if<UseCalibration>(&done.command.what)) {
     calibration_ = use->calibration;
     restore_failure_.clear();  // of the calibration before
+    config_.calibration_note.clear();
     compare_camera();
   }
   if (const auto* how = std::get_if<SetReconstruction>(&done.command.what)) rules_ = how->rules;
@@ -240,6 +241,10 @@ Status Pipeline::status() const {
   status.storage_message = loop_->tracker().storage_message();
   if (status.storage_message.empty() && !loop_->tracker().has_written()) {
     status.storage_message = restore_failure_;
+  }
+  if (!config_.calibration_note.empty()) {
+    const std::string separator = status.storage_message.empty() ? "" : " ";
+    status.storage_message = config_.calibration_note + separator + status.storage_message;
   }
   return status;
 }

@@ -72,6 +72,9 @@ struct PipelineConfig {
   /// More of the calibration's pixels than this beyond the list: Health::beyond_calibration.
   int beyond_pixels = 64;
   std::filesystem::path state_folder;  ///< Keeps the last good reference; empty = not kept.
+  /// Why another calibration than the current one, or none, is used since the start, and what to
+  /// do.
+  std::string calibration_note;
 };
 
 }  // namespace dtact::pipeline

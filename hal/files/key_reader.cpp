@@ -9,6 +9,8 @@
 #include <stdexcept>
 #include <type_traits>
 
+#include "hal/files/toml_bounds.hpp"
+
 namespace dtact::tomlfile {
 namespace {
 
@@ -166,6 +168,7 @@ void KeyReader::finish() const {
 }
 
 toml::table parse(std::string_view text, const std::string& where) {
+  (void)check_bounds(text, where);
   try {
     return toml::parse(text, where);
   } catch (const toml::parse_error& e) {

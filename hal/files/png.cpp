@@ -1,10 +1,12 @@
 #include "hal/files/png.hpp"
 
+#include <fmt/format.h>
 #include <png.h>
 
 #include <csetjmp>
 #include <cstddef>
 #include <cstring>
+#include <new>
 #include <stdexcept>
 
 #include "hal/base/atomic_file.hpp"
@@ -12,8 +14,8 @@
 namespace dtact::image {
 namespace {
 
-// Larger than any camera; keeps a damaged header from asking for all memory.
-constexpr png_uint_32 kMaxSide = 16384;
+/// Of any chunk that is read, bytes: libpng allows 8 MB, a palette has 768.
+constexpr png_alloc_size_t kMaxChunk = 64U << 10U;
 
 struct Reader {
   std::string_view bytes;
@@ -38,6 +40,31 @@ void on_write(png_structp png, png_bytep data, std::size_t n) {
 }
 void on_flush(png_structp /*png*/) {}
 
+/// libpng's structures, freed on every path.
+struct Structures {
+  explicit Structures(bool for_writing) : writing(for_writing) {}
+  ~Structures() {
+    if (writing) {
+      png_destroy_write_struct(&png, &info);
+    } else {
+      png_destroy_read_struct(&png, &info, nullptr);
+    }
+  }
+  Structures(const Structures&) = delete;
+  Structures& operator=(const Structures&) = delete;
+
+  /// Throws std::bad_alloc where libpng got no memory.
+  void take(png_structp created) {
+    png = created;
+    if (png != nullptr) info = png_create_info_struct(png);
+    if (info == nullptr) throw std::bad_alloc();
+  }
+
+  bool writing;
+  png_structp png = nullptr;
+  png_infop info = nullptr;
+};
+
 /// Decoded samples, 16 bits in the machine's order when `wide`, grey or r g b.
 struct Samples {
   int width = 0;
@@ -50,7 +77,10 @@ struct Samples {
 // setjmp and C++ objects: everything with a destructor lives in the caller's frame.
 bool read_samples(png_structp png, png_infop info, Samples& out, std::vector<png_bytep>& rows) {
   if (setjmp(png_jmpbuf(png)) != 0) return false;
-  png_set_user_limits(png, kMaxSide, kMaxSide);
+  png_set_user_limits(png, kMaxPngSide, kMaxPngSide);
+  png_set_chunk_malloc_max(png, kMaxChunk);
+  // Skips texts, colour profiles and the like unread.
+  png_set_keep_unknown_chunks(png, PNG_HANDLE_CHUNK_NEVER, nullptr, -1);
   png_read_info(png, info);
   png_set_expand(png);
   png_set_strip_alpha(png);
@@ -71,15 +101,16 @@ bool read_samples(png_structp png, png_infop info, Samples& out, std::vector<png
 }
 
 Samples decode(std::string_view bytes, const std::string& name) {
+  (void)png_header(bytes, name);
   Reader reader{bytes, {}};
-  png_structp png = png_create_read_struct(PNG_LIBPNG_VER_STRING, &reader, on_error, on_warning);
-  png_infop info = png_create_info_struct(png);
-  png_set_read_fn(png, &reader, on_read);
+  Structures libpng(false);
+  libpng.take(png_create_read_struct(PNG_LIBPNG_VER_STRING, &reader, on_error, on_warning));
+  png_set_read_fn(libpng.png, &reader, on_read);
   Samples samples;
   std::vector<png_bytep> rows;
-  const bool ok = read_samples(png, info, samples, rows);
-  png_destroy_read_struct(&png, &info, nullptr);
-  if (!ok) throw std::runtime_error(name + ": not a readable PNG: " + reader.error);
+  if (!read_samples(libpng.png, libpng.info, samples, rows)) {
+    throw std::runtime_error(name + ": not a readable PNG: " + reader.error);
+  }
   return samples;
 }
 
@@ -132,16 +163,42 @@ std::string encode(int width, int height, int depth, int colour, const std::uint
                    std::size_t row_bytes) {
   std::string out;
   Reader reader;
-  png_structp png = png_create_write_struct(PNG_LIBPNG_VER_STRING, &reader, on_error, on_warning);
-  png_infop info = png_create_info_struct(png);
-  png_set_write_fn(png, &out, on_write, on_flush);
-  const bool ok = write_rows(png, info, width, height, depth, colour, data, row_bytes);
-  png_destroy_write_struct(&png, &info);
-  if (!ok) throw std::runtime_error("cannot encode PNG: " + reader.error);
+  Structures libpng(true);
+  libpng.take(png_create_write_struct(PNG_LIBPNG_VER_STRING, &reader, on_error, on_warning));
+  png_set_write_fn(libpng.png, &out, on_write, on_flush);
+  if (!write_rows(libpng.png, libpng.info, width, height, depth, colour, data, row_bytes)) {
+    throw std::runtime_error("cannot encode PNG: " + reader.error);
+  }
   return out;
 }
 
 }  // namespace
+
+PngHeader png_header(std::string_view bytes, const std::string& name) {
+  // PNG specification, 5.2 and 11.2.2: the signature, then IHDR's length, type and data.
+  constexpr std::string_view kStart("\x89PNG\r\n\x1A\n\0\0\0\x0DIHDR", 16);
+  constexpr std::size_t kSize = kStart.size() + 10;
+  if (bytes.size() < kSize || !bytes.starts_with(kStart)) {
+    throw std::runtime_error(name + ": not a readable PNG: it does not begin as one");
+  }
+  const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(bytes[i]); };
+  const auto side = [&](std::size_t i) {
+    return std::uint32_t{byte(i)} << 24U | std::uint32_t{byte(i + 1)} << 16U |
+           std::uint32_t{byte(i + 2)} << 8U | byte(i + 3);
+  };
+  const std::uint32_t width = side(kStart.size());
+  const std::uint32_t height = side(kStart.size() + 4);
+  if (width < 1 || height < 1 || width > kMaxPngSide || height > kMaxPngSide ||
+      std::uint64_t{width} * height > kMaxPngPixels) {
+    throw std::runtime_error(fmt::format(
+        "{}: is {}x{} pixels; at most {} a side and {} in all are read: make the image smaller",
+        name, width, height, kMaxPngSide, kMaxPngPixels));
+  }
+  return {.width = static_cast<int>(width),
+          .height = static_cast<int>(height),
+          .bits = byte(kStart.size() + 8),
+          .grey = byte(kStart.size() + 9) == PNG_COLOR_TYPE_GRAY};
+}
 
 Grey16 decode_png_grey16(std::string_view bytes, const std::string& name) {
   return to_grey16(decode(bytes, name));

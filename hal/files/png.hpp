@@ -29,6 +29,22 @@ struct Rgb8 {
   std::vector<std::uint8_t> pixels;
 };
 
+/// Limits of any PNG that is read: 8192x8192 pixels are more than any camera's mode.
+inline constexpr std::uint32_t kMaxPngSide = 16384;
+inline constexpr std::uint64_t kMaxPngPixels = std::uint64_t{1} << 26U;
+
+/// What a PNG says of itself before its pixels.
+struct PngHeader {
+  int width = 0;      ///< Pixels.
+  int height = 0;     ///< Pixels.
+  int bits = 0;       ///< Of a sample: 1, 2, 4, 8 or 16.
+  bool grey = false;  ///< Grey without transparency.
+};
+
+/// Reads the first bytes only. Throws std::runtime_error, which contains `name`, for what is no PNG
+/// or beyond the limits.
+[[nodiscard]] PngHeader png_header(std::string_view bytes, const std::string& name);
+
 /// A PNG as 8-bit grey. Colour becomes luma by ITU-R BT.601 (0.299 r + 0.587 g + 0.114 b, rounded),
 /// like a JPEG's luma; 16-bit is reduced by rounding; transparency is ignored. Throws
 /// std::runtime_error naming `path`.

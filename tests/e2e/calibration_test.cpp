@@ -1,8 +1,15 @@
 // Calibrations on a running daemon, and dtactctl as a user runs it.
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
+#include <atomic>
+#include <chrono>
 #include <csignal>
+#include <filesystem>
+#include <set>
+#include <thread>
 
 #include "hal/base/atomic_file.hpp"
 #include "hal/sim/scene.hpp"
@@ -233,6 +240,89 @@ TEST_F(TwoCalibrations, ADaemonWhoseUploadedOneIsDamagedStartsAndCanBeFixed) {
   std::string output;
   ASSERT_EQ(activate("configured", &output), 0) << output;
   EXPECT_TRUE(depth_flows_again_at(kConfigured));
+}
+
+// A reference that is never read to its end stands for one that ends the daemon, or is so large
+// that systemd does.
+TEST_F(TwoCalibrations, ADaemonThatOneKeepsFromStartingBeginsWithTheConfiguredOne) {
+  const auto file = sensor_.folder.path() / "state/calibrations/1/other/reference.png";
+  const std::string png = base::read_file(file);
+  ASSERT_EQ(sensor_.daemon->stop(SIGTERM), 0);
+  std::filesystem::remove(file);
+  ASSERT_EQ(::mkfifo(file.c_str(), 0600), 0);
+  std::vector<std::string> command = sensor_.arguments;
+  command.insert(command.begin(), DTACTD_PROGRAM);
+  for (int i = 0; i < 3; ++i) {
+    Program start(command);
+    std::string counted;
+    while (counted.find(fmt::format("\n{}\n", i + 1)) == std::string::npos) {
+      ASSERT_FALSE(start.ended()) << start.log();
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+      const auto starts = sensor_.folder.path() / "state/calibration.starts";
+      counted = std::filesystem::exists(starts) ? base::read_file(starts) : "";
+    }
+    EXPECT_EQ(start.stop(SIGKILL), 128 + SIGKILL);
+  }
+  sensor_.daemon = std::make_unique<DaemonProcess>(sensor_.arguments);
+  EXPECT_TRUE(depth_flows_again_at(kConfigured));
+  const std::string said = "Calibration 1 (other) is not used: 3 starts with it ended early";
+  EXPECT_THAT(sensor_.daemon->log(), HasSubstr(said));
+  EXPECT_THAT(sensor_.connect().status().advice(), HasSubstr(said));
+  std::filesystem::remove(file);
+  base::write_file_atomically(file, png);
+  EXPECT_THAT(list(), AllOf(HasSubstr("* configured"), HasSubstr(">          1  20")));
+  std::string output;
+  EXPECT_EQ(
+      ctl(sensor_, {"calibration", "download", "1", "-o", sensor_.folder.path() / "copy"}, &output),
+      0)
+      << output;
+  ASSERT_EQ(activate("1", &output), 0) << output;
+  EXPECT_TRUE(depth_flows_again_at(kOther));
+  EXPECT_EQ(sensor_.connect().status().advice(), "");
+  sensor_.restart();
+  EXPECT_TRUE(depth_flows_again_at(kOther));
+}
+
+TEST(Calibration, TheStateFolderHasOneOwner) {
+  const Sensor sensor;
+  std::vector<std::string> second = sensor.arguments;
+  second.insert(second.begin(), DTACTD_PROGRAM);
+  std::string output;
+  EXPECT_EQ(run_program(second, &output), 1);
+  EXPECT_THAT(output, AllOf(HasSubstr("belongs to dtactd, process " +
+                                      std::to_string(sensor.daemon->pid()) + ", sensor "),
+                            HasSubstr("set state_dir")));
+}
+
+// Each upload is kept or refused with a word, and none takes the number of another.
+TEST(Calibration, UploadsAtOnceAreNotLost) {
+  const Sensor sensor;
+  const v1::UploadCalibration files = upload_of(sensor.connect().calibration());
+  std::atomic<int> kept{0};
+  std::vector<std::thread> clients;
+  for (int i = 0; i < 6; ++i) {
+    clients.emplace_back([&sensor, &kept, upload = files, i]() mutable {
+      client::Client client = sensor.connect();
+      upload.set_name(fmt::format("upload-{}", i));
+      for (int patience = 0; patience < 300; ++patience) {
+        try {
+          client.upload_calibration(upload);
+          ++kept;
+          return;
+        } catch (const client::Refused& e) {
+          EXPECT_EQ(e.code(), v1::ERROR_BUSY) << e.what();
+          std::this_thread::sleep_for(std::chrono::milliseconds(100));
+        }
+      }
+    });
+  }
+  for (std::thread& client : clients) client.join();
+  EXPECT_EQ(kept, 6);
+  std::set<std::string> names;
+  for (const auto& stored : sensor.connect().calibrations()) {
+    if (stored.number() > 0) names.insert(stored.name());
+  }
+  EXPECT_EQ(names.size(), 6U);
 }
 
 TEST_F(TwoCalibrations, AreExportedAsTheyWereUploaded) {

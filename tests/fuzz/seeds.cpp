@@ -1,4 +1,5 @@
-// Writes the seeds that are not text: fuzz_seeds tests/fuzz/corpus
+// Writes the seeds that are not text: fuzz_seeds tests/fuzz/corpus. With "large", instead those of
+// megabytes: fuzz_seeds build/fuzz/corpus large
 #include <filesystem>
 #include <fstream>
 #include <functional>
@@ -11,6 +12,7 @@
 #include "proto/depth_encoding.hpp"
 #include "proto/dtact.pb.h"
 #include "proto/framing.hpp"
+#include "tests/fakes/hostile_files.hpp"
 #include "tests/fakes/jpeg_maker.hpp"
 #include "tests/unit/calibration/sample.hpp"
 
@@ -276,15 +278,54 @@ void add_pictures(const Corpus& corpus) {
   corpus.add("recording", "colour_png", "\n--\n" + image::encode_png(rgb));
 }
 
+void add_files(const Corpus& corpus) {
+  corpus.add("png", "grey16",
+             image::encode_png(
+                 image::Grey16{5, 3, {0, 1, 255, 256, 65280, 65535, 7, 7, 7, 7, 7, 7, 7, 7, 7}}));
+  const std::string grey8 =
+      image::encode_png(image::Grey8{4, 2, {0, 50, 100, 150, 200, 250, 1, 2}});
+  corpus.add("png", "grey8", grey8);
+  corpus.add("png", "rgb8", image::encode_png(image::Rgb8{2, 1, {1, 2, 3, 250, 251, 252}}));
+  corpus.add("png", "texts", fakes::with_text_chunks(grey8, 3, 100'000));
+  corpus.add("toml", "deep", fakes::deep_toml(12));
+  corpus.add("toml", "wide", fakes::wide_toml(300));
+  corpus.add("toml", "keys", fakes::many_keys_toml(300));
+}
+
+/// Of the sizes that the wire carries.
+void add_large(const Corpus& corpus) {
+  constexpr std::size_t kWire = 16'700'000;
+  const std::string tables = "a = " + std::string(kWire / 2, '[') + std::string(kWire / 2, ']');
+  const std::string text = "a = \"" + std::string(kWire, 'x') + "\"\n";
+  for (const char* target : {"toml", "config", "lens", "calibration"}) {
+    corpus.add(target, "large_deep", fakes::deep_toml(kWire / 2));
+    corpus.add(target, "large_wide", fakes::wide_toml(kWire));
+    corpus.add(target, "large_keys", fakes::many_keys_toml(kWire));
+    corpus.add(target, "large_tables", tables);
+    corpus.add(target, "large_text", text);
+    corpus.add(target, "max_wide", fakes::wide_toml(520'000));
+    corpus.add(target, "max_keys", fakes::many_keys_toml(300'000));
+  }
+  corpus.add("png", "large_texts",
+             fakes::with_text_chunks(fakes::grey16_png(40, 30), 2000, 7'900'000));
+  corpus.add("png", "large_picture", fakes::grey16_png(4096, 2048));
+}
+
 }  // namespace
 }  // namespace dtact::fuzz
 
 int main(int argc, char** argv) {
-  if (argc != 2) {
-    std::cerr << "usage: fuzz_seeds FOLDER\n";
+  const bool large = argc == 3 && std::string(argv[2]) == "large";
+  if (argc != 2 && !large) {
+    std::cerr << "usage: fuzz_seeds FOLDER [large]\n";
     return 2;
   }
   const dtact::fuzz::Corpus corpus(argv[1]);
+  if (large) {
+    dtact::fuzz::add_large(corpus);
+    return 0;
+  }
+  dtact::fuzz::add_files(corpus);
   dtact::fuzz::add_requests(corpus);
   dtact::fuzz::add_answers(corpus);
   dtact::fuzz::add_depth(corpus, "small", 5, 3);

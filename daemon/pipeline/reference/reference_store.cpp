@@ -9,12 +9,14 @@
 #include <utility>
 
 #include "hal/base/atomic_file.hpp"
+#include "hal/files/key_reader.hpp"
 #include "hal/files/png.hpp"
 
 namespace dtact::pipeline {
 namespace {
 
 constexpr int kVersion = 1;
+constexpr const char* kFix = "delete it, a new one is kept as soon as there is no contact";
 
 /// FNV-1a, 64 bits: enough to notice files that do not belong together.
 std::int64_t checksum(std::string_view bytes) {
@@ -26,8 +28,7 @@ std::int64_t checksum(std::string_view bytes) {
 }
 
 [[noreturn]] void refuse(const std::filesystem::path& file, const std::string& why) {
-  throw std::runtime_error(fmt::format(
-      "{}: {}; delete it, a new one is kept as soon as there is no contact", file.string(), why));
+  throw std::runtime_error(fmt::format("{}: {}; {}", file.string(), why, kFix));
 }
 
 hal::Light light_of(const toml::table& table, const std::filesystem::path& file) {
@@ -84,9 +85,9 @@ std::optional<StoredReference> load_reference(const calibration::Calibration& ca
   if (!std::filesystem::exists(toml_file) || !std::filesystem::exists(png_file)) return {};
   toml::table table;
   try {
-    table = toml::parse(base::read_file(toml_file), toml_file.string());
-  } catch (const toml::parse_error& e) {
-    refuse(toml_file, fmt::format("line {}: {}", e.source().begin.line, e.description()));
+    table = tomlfile::parse(base::read_file(toml_file), toml_file.string());
+  } catch (const std::runtime_error& e) {
+    throw std::runtime_error(fmt::format("{}; {}", e.what(), kFix));
   }
   if (table["version"].value<std::int64_t>() != kVersion) refuse(toml_file, "unknown version");
   if (table["calibration"].value<std::string>() != calibration.name ||
@@ -99,11 +100,11 @@ std::optional<StoredReference> load_reference(const calibration::Calibration& ca
   if (table["image_checksum"].value<std::int64_t>() != checksum(png)) {
     refuse(png_file, "belongs to another reference.toml");
   }
-  image::Grey16 image = image::decode_png_grey16(png, png_file.string());
-  if (image.width != width || image.height != height) return {};
+  const image::PngHeader header = image::png_header(png, png_file.string());
+  if (header.width != width || header.height != height) return {};
   stored.width = width;
   stored.height = height;
-  stored.image_q8 = std::move(image.pixels);
+  stored.image_q8 = image::decode_png_grey16(png, png_file.string()).pixels;
   return stored;
 }
 

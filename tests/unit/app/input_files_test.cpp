@@ -1,7 +1,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <cstdlib>
+#include <filesystem>
 #include <functional>
 #include <stdexcept>
 
@@ -89,6 +91,22 @@ TEST(InputFiles, OnlyTheSimulatedSensorHasACalibrationOfItsOwn) {
     EXPECT_EQ(calibration_folder(config), "/no/such/own") << backend;
     EXPECT_THAT(error([&] { check_calibration(config); }), StartsWith("calibration = "));
   }
+}
+
+TEST(StateFolder, HasOneOwnerWhoIsNamed) {
+  const std::filesystem::path folder = fakes::own_path("state");
+  std::filesystem::create_directories(folder);
+  base::UniqueFd left = own_state_folder(folder, "left");
+  const std::string refused = error([&] { (void)own_state_folder(folder, "right"); });
+  EXPECT_THAT(refused,
+              StartsWith("the state folder " + folder.string() + " belongs to dtactd, process " +
+                         std::to_string(::getpid()) + ", sensor \"left\": "));
+  EXPECT_THAT(refused, HasSubstr("state_dir"));
+  left.reset();
+  EXPECT_TRUE(own_state_folder(folder, "right"));
+  EXPECT_THAT(error([&] { (void)own_state_folder(folder / "no", "left"); }),
+              HasSubstr("state_dir"));
+  std::filesystem::remove_all(folder);
 }
 
 }  // namespace

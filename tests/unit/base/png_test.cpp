@@ -2,9 +2,12 @@
 
 #include <gtest/gtest.h>
 
+#include <ctime>
 #include <stdexcept>
+#include <utility>
 
 #include "hal/base/atomic_file.hpp"
+#include "tests/fakes/hostile_files.hpp"
 #include "tests/fakes/own_path.hpp"
 
 namespace dtact::image {
@@ -40,6 +43,56 @@ TEST(Png, DamagedFileIsNamed) {
       FAIL() << keep;
     } catch (const std::runtime_error& e) {
       EXPECT_NE(std::string(e.what()).find("broken.png"), std::string::npos);
+    }
+  }
+}
+
+TEST(Png, TextsAndProfilesAreSkipped) {
+  const Grey16 image{3, 2, {0, 1, 255, 256, 65280, 65535}};
+  const std::string png = encode_png(image);
+  // Each would be 7.9 MB.
+  const std::string texts = fakes::with_text_chunks(png, 100, 7'900'000);
+  const auto begin = std::clock();
+  EXPECT_EQ(decode_png_grey16(texts, "memory").pixels, image.pixels);
+  EXPECT_LT(std::clock() - begin, CLOCKS_PER_SEC / 2);
+  // Longer than any chunk that is read, and broken inside.
+  for (const char* type : {"tEXt", "iCCP", "zzZz"}) {
+    std::string with = png;
+    with.insert(33, fakes::png_chunk(type, std::string(9'000'000, 'x')));
+    EXPECT_EQ(decode_png_grey16(with, "memory").pixels, image.pixels) << type;
+  }
+}
+
+TEST(Png, SizeAndKindAreKnownBeforePixels) {
+  const std::string png = fakes::grey16_png(40, 30);
+  const PngHeader header = png_header(std::string_view(png).substr(0, 26), "memory");
+  EXPECT_EQ(header.width, 40);
+  EXPECT_EQ(header.height, 30);
+  EXPECT_EQ(header.bits, 16);
+  EXPECT_TRUE(header.grey);
+  const PngHeader colour = png_header(encode_png(Rgb8{1, 1, {1, 2, 3}}), "memory");
+  EXPECT_EQ(colour.bits, 8);
+  EXPECT_FALSE(colour.grey);
+  EXPECT_THROW((void)png_header(std::string_view(png).substr(0, 25), "memory"), std::runtime_error);
+}
+
+TEST(Png, TooManyPixelsAreRefusedUnread) {
+  for (const auto& [width, height] : {std::pair(16385U, 1U), std::pair(1U, 16385U),
+                                      std::pair(16384U, 4097U), std::pair(0U, 5U)}) {
+    // Only the header is there: what follows is not looked at.
+    std::string png = fakes::grey16_png(1, 1).substr(0, 16);
+    for (const std::uint32_t side : {width, height}) {
+      for (unsigned i = 0; i < 4; ++i) png += static_cast<char>(side >> (24U - 8U * i));
+    }
+    png += "\x10";
+    png += std::string(4, '\0');
+    try {
+      (void)decode_png_grey16(png, "large.png");
+      FAIL() << width << "x" << height;
+    } catch (const std::runtime_error& e) {
+      EXPECT_NE(std::string(e.what()).find(std::to_string(width) + "x" + std::to_string(height)),
+                std::string::npos)
+          << e.what();
     }
   }
 }

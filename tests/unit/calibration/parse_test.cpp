@@ -270,6 +270,21 @@ TEST(ParseCalibration, RefusesAReferenceThatCannotBe) {
       image::encode_png(image::Grey16{13, 9, std::vector<std::uint16_t>(117, 1)}), "13x9");
   expect_reference_refused(
       image::encode_png(image::Grey16{12, 9, std::vector<std::uint16_t>(108, 65281)}), "65280");
+  expect_reference_refused(
+      image::encode_png(image::Grey8{12, 9, std::vector<std::uint8_t>(108, 1)}), "16-bit grey");
+  expect_reference_refused(image::encode_png(image::Rgb8{12, 9, std::vector<std::uint8_t>(324, 1)}),
+                           "16-bit grey");
+}
+
+TEST(ParseCalibration, RefusesAnotherFrameThanTheCameras) {
+  const Files files = format(sample());
+  const auto read = [&](FrameSize camera) {
+    return parse(files.toml, files.reference_png, "upload", camera);
+  };
+  EXPECT_EQ(read({12, 9}).model->rectify.frame_width, 12);
+  EXPECT_THAT([&] { (void)read({9, 12}); },
+              ThrowsMessage<std::runtime_error>(
+                  HasSubstr("frame: is for frames of 12x9 pixels, the camera delivers 9x12: set")));
 }
 
 TEST(FormatCalibration, RefusesAnotherRectificationThanTheCrop) {

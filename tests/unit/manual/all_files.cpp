@@ -73,7 +73,12 @@ std::vector<File> all_files(const std::filesystem::path& root) {
         "calibrations, which are the first one's own there."},
        {"/var/lib/dtactd",
         "Uploaded calibrations and the last good reference, unless `state_dir` or the unit names "
-        "another folder."},
+        "another folder. A daemon whose folder another one has ends and names that one. After "
+        "three "
+        "starts in a row that ended while they read the current uploaded calibration, the daemon "
+        "begins with the configured one or none and says so in log and status; `dtactctl "
+        "calibration "
+        "activate` tries it again."},
        {"/run/dtactd/dtactd.sock",
         "For programs on this machine, unless `net.unix_socket` names another path."},
        {"/etc/credstore/dtactd.tokens, dtactd.tls-key, dtactd.tls-certificate",

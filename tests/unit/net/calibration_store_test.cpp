@@ -65,7 +65,7 @@ TEST_F(Store, IsEmptyAtFirst) {
   EXPECT_THROW((void)store.read({}), std::runtime_error);
   EXPECT_THROW((void)store.read(0), NoSuchCalibration);
   EXPECT_THROW((void)store.read(1), NoSuchCalibration);
-  EXPECT_THROW((void)store.load(1), NoSuchCalibration);
+  EXPECT_THROW((void)store.load(1, {}), NoSuchCalibration);
   EXPECT_THROW(store.make_current(0), NoSuchCalibration);
   EXPECT_THROW(store.make_current(1), NoSuchCalibration);
 }
@@ -138,7 +138,7 @@ TEST_F(Store, GoesBackToAnEarlierOne) {
   store.keep(whole("ball"));
   EXPECT_EQ(store.keep(whole("pins")), 2U);
   EXPECT_EQ(current_of(store.list()), 2U);
-  EXPECT_EQ(store.load(1)->name, "ball");
+  EXPECT_EQ(store.load(1, {})->name, "ball");
   store.make_current(1);
   EXPECT_EQ(current_of(store.list()), 1U);
   EXPECT_EQ(store.current(), numbered(1) / "ball");
@@ -154,7 +154,7 @@ TEST_F(Store, GoesBackToTheConfiguredOne) {
   EXPECT_EQ(current_of(store.list()), 0U);
   store.keep(whole("ball"));
   EXPECT_EQ(current_of(store.list()), 1U);
-  EXPECT_EQ(store.load(0)->name, "factory");
+  EXPECT_EQ(store.load(0, {})->name, "factory");
   store.make_current(0);
   EXPECT_EQ(current_of(store.list()), 0U);
   EXPECT_EQ(store.read({}).name, "factory");
@@ -274,12 +274,83 @@ TEST_F(Store, ReadsForTheListWhatHasChanged) {
   EXPECT_EQ(factory.files(), 0);
 }
 
+// Reading a calibration for the list takes as long as reading it for use.
+TEST_F(Store, ListsAfterAStartWhatItAcceptedByItsDigests) {
+  {
+    FolderCalibrationStore store(state_, {});
+    const CalibrationFiles files = whole("ball");
+    (void)store.check(files, {});
+    store.keep(files);
+    store.keep(whole("pins"));  // accepted: of the same bytes
+    store.keep({"other", "never checked", "p"});
+  }
+  const fs::path toml = numbered(1) / "ball/calibration.toml";
+  const fs::path record = numbered(1) / "accepted.toml";
+  const std::string before = calibration::sha256_hex(base::read_file(toml));
+  std::string text = base::read_file(record);
+  {
+    const auto all = FolderCalibrationStore(state_, {}).list();
+    ASSERT_THAT(numbers(all), ElementsAre(1, 2, 3));
+    EXPECT_EQ(*all[0].summary,
+              (CalibrationSummary{
+                  "ball", "lut", 0.051, 6, 5, -0.01, 0.02, "2026-01-31T12:00:00Z", 12, 9, {1, 2}}));
+    EXPECT_EQ(all[1].summary->name, "pins");
+    EXPECT_THAT(all[2].damage, HasSubstr("3/other/calibration.toml:1"));
+  }
+  // Other files than those accepted are read; with their digest they would not be.
+  base::write_file_atomically(toml, "no calibration");
+  EXPECT_THAT(FolderCalibrationStore(state_, {}).list()[0].damage, HasSubstr("calibration.toml:1"));
+  text.replace(text.find(before), before.size(), calibration::sha256_hex("no calibration"));
+  base::write_file_atomically(record, text);
+  EXPECT_EQ(FolderCalibrationStore(state_, {}).list()[0].damage, "");
+  base::write_file_atomically(record, "no record");
+  EXPECT_THAT(FolderCalibrationStore(state_, {}).list()[0].damage, HasSubstr("calibration.toml:1"));
+}
+
+TEST_F(Store, PassesOverOneThatStartsDoNotSurvive) {
+  const fs::path configured = make_configured();
+  (void)FolderCalibrationStore(state_, configured).keep(whole("ball"));
+  for (int i = 0; i < 2; ++i) {
+    EXPECT_TRUE(FolderCalibrationStore(state_, configured).begin_start()) << i;
+  }
+  {
+    FolderCalibrationStore store(state_, configured);  // one that does is enough
+    EXPECT_TRUE(store.begin_start());
+    store.end_start();
+  }
+  for (int i = 0; i < 3; ++i) {
+    FolderCalibrationStore store(state_, configured);
+    EXPECT_TRUE(store.begin_start()) << i;
+    EXPECT_EQ(store.started_number(), 1U);
+  }
+  for (int i = 0; i < 2; ++i) {
+    FolderCalibrationStore store(state_, configured);
+    EXPECT_FALSE(store.begin_start());
+    store.end_start();  // of a start without it: it stays passed over
+    EXPECT_EQ(store.started_number(), 0U);
+    EXPECT_EQ(store.current_number(), 1U);
+    EXPECT_EQ(store.read(1).name, "ball");
+  }
+  {
+    FolderCalibrationStore store(state_, {});
+    EXPECT_FALSE(store.begin_start());
+    EXPECT_EQ(store.started_number(), std::nullopt);
+    store.make_current(1);  // tries it again
+  }
+  FolderCalibrationStore store(state_, configured);
+  EXPECT_TRUE(store.begin_start());
+  store.keep(whole("pins"));  // another one has not failed
+  for (int i = 0; i < 3; ++i) EXPECT_TRUE(FolderCalibrationStore(state_, configured).begin_start());
+  store.make_current(0);
+  for (int i = 0; i < 5; ++i) EXPECT_TRUE(FolderCalibrationStore(state_, configured).begin_start());
+}
+
 TEST_F(Store, RefusesToLoadADamagedOne) {
   FolderCalibrationStore store(state_, {});
   store.keep(whole("ball"));
   store.keep(whole("pins"));
   base::write_file_atomically(numbered(1) / "ball/calibration.toml", "version = 1\n");
-  EXPECT_THROW((void)store.load(1), std::runtime_error);
+  EXPECT_THROW((void)store.load(1, {}), std::runtime_error);
   EXPECT_EQ(current_of(store.list()), 2U);
   EXPECT_EQ(store.read(1).toml, "version = 1\n");  // its files can be read
 }
@@ -312,9 +383,9 @@ TEST_F(Store, FailsWhereItCannotWrite) {
 
 TEST_F(Store, RefusesWhatIsNoCalibration) {
   FolderCalibrationStore store(state_, {});
-  EXPECT_THROW((void)store.check({"ball", "this is no toml", "this is no png"}),
+  EXPECT_THROW((void)store.check({"ball", "this is no toml", "this is no png"}, {}),
                std::runtime_error);
-  EXPECT_EQ(store.check(whole("ball"))->name, "ball");
+  EXPECT_EQ(store.check(whole("ball"), {})->name, "ball");
   EXPECT_EQ(store.current(), fs::path());
 }
 

@@ -21,7 +21,9 @@ namespace dtact::net::test {
 /// current. The text "bad" is not a calibration; making the one with "unwritable" current fails.
 class FakeStore : public CalibrationStore {
  public:
-  std::shared_ptr<const calibration::Calibration> check(const CalibrationFiles& files) override {
+  std::shared_ptr<const calibration::Calibration> check(
+      const CalibrationFiles& files,
+      const std::optional<calibration::FrameSize>& /*camera*/) override {
     if (files.toml == "bad") throw std::runtime_error("upload: calibration.toml:3: scale missing");
     auto calibration = std::make_shared<calibration::Calibration>();
     calibration->name = files.name;
@@ -50,8 +52,9 @@ class FakeStore : public CalibrationStore {
     }
     return all;
   }
-  std::shared_ptr<const calibration::Calibration> load(std::uint64_t number) override {
-    return check(at(number));
+  std::shared_ptr<const calibration::Calibration> load(
+      std::uint64_t number, const std::optional<calibration::FrameSize>& camera) override {
+    return check(at(number), camera);
   }
   void make_current(std::uint64_t number) override {
     if (at(number).toml == "unwritable") throw std::runtime_error("cannot write /state: disk full");

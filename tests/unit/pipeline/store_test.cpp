@@ -90,7 +90,7 @@ TEST_F(StoreTest, DamageNamesFileAndFix) {
     FAIL();
   } catch (const std::runtime_error& e) {
     const std::string what = e.what();
-    EXPECT_NE(what.find("reference.toml: line 2"), std::string::npos) << what;
+    EXPECT_NE(what.find("reference.toml:2: "), std::string::npos) << what;
     EXPECT_NE(what.find("delete it"), std::string::npos) << what;
   }
 }

@@ -1,0 +1,32 @@
+#include "hal/base/free_memory.hpp"
+
+#include <malloc.h>
+#include <sys/mman.h>
+
+#include <fstream>
+#include <string>
+
+#include "hal/base/rt_thread.hpp"
+
+namespace dtact::base {
+namespace {
+
+/// "VmLck:   1234 kB" of /proc/self/status, see proc(5).
+bool is_memory_locked() {
+  std::ifstream status("/proc/self/status");
+  for (std::string line; std::getline(status, line);) {
+    if (line.starts_with("VmLck:")) return line.find_first_of("123456789") != std::string::npos;
+  }
+  return false;
+}
+
+}  // namespace
+
+void release_free_memory() {
+  const bool locked = is_memory_locked();
+  if (locked) ::munlockall();
+  (void)::malloc_trim(0);
+  if (locked) (void)lock_memory();  // it was granted before
+}
+
+}  // namespace dtact::base
