@@ -19,10 +19,10 @@
 #include "daemon/announce/announcer.hpp"
 #include "daemon/app/files.hpp"
 #include "daemon/app/journal.hpp"
-#include "daemon/app/realtime_throttle.hpp"
 #include "daemon/app/reload.hpp"
 #include "daemon/app/service.hpp"
 #include "daemon/app/status_reporter.hpp"
+#include "daemon/app/throttle_timer.hpp"
 #include "daemon/app/watchdog.hpp"
 #include "daemon/calibration/calibration.hpp"
 #include "daemon/metrics/endpoint.hpp"
@@ -199,6 +199,7 @@ std::string reload(Config& running, const std::function<Config()>& load, net::Se
 
 void run_daemon(const Config& config, const std::function<Config()>& load) {
   keep_little_memory();
+  base::demote_at_rttime_limit();
   asio::io_context io(1);
   // Before any thread starts, so that every thread leaves the signals to this one.
   asio::signal_set signals(io, SIGTERM, SIGINT);
@@ -268,7 +269,7 @@ void run_daemon(const Config& config, const std::function<Config()>& load) {
   };
   wait_for_hangup();
   Watchdog watchdog(io, [&pipeline] { return pipeline.heartbeat(); });
-  RealtimeThrottle realtime_throttle(io);
+  ThrottleTimer throttle_timer(io);
   signals.async_wait([&](const boost::system::error_code& error, int signal) {
     if (error) return;
     spdlog::info("{}: stopping", signal == SIGTERM ? "SIGTERM" : "SIGINT");
@@ -277,7 +278,7 @@ void run_daemon(const Config& config, const std::function<Config()>& load) {
     hangups.cancel();
     reporter.stop();
     watchdog.stop();
-    realtime_throttle.stop();
+    throttle_timer.stop();
     if (announced) announced->stop();
     if (metrics) metrics->stop();
     server.stop();

@@ -76,6 +76,10 @@ constexpr std::array<Fix, pipeline::kHealthCount> kFixes = {{
      "The camera takes fewer frames than its mode promises: set exposure_dynamic_framerate "
      "(automatic priority) to 0, make the exposure shorter than a frame, or give the camera more "
      "USB bandwidth (a port without a hub, MJPEG)."},
+    {Health::machine_slow,
+     "This machine is too slow for the camera's mode and leaves frames out: set a lower camera.fps "
+     "or a smaller camera.width and camera.height, or reconstruct at a lower resolution (dtactctl "
+     "reconstruction)."},
     {Health::frames_lost,
      "The camera loses frames on their way to this machine: look at the USB cable and hub."},
     {Health::not_realtime,
@@ -94,6 +98,9 @@ std::string detail(const pipeline::Status& status, Health health) {
   if (health == Health::camera_slow) {
     return fmt::format("By their timestamps {:.1f} come in a second instead of {:g}.",
                        status.camera_fps, status.camera.fps);
+  }
+  if (health == Health::machine_slow) {
+    return fmt::format("It processes {:.1f} of {:.1f} a second.", status.fps, status.camera_fps);
   }
   if (health == Health::camera_fault && status.camera_damaged) {
     const std::string& reason = status.camera_report.damage_reason;

@@ -21,8 +21,9 @@ namespace {
 
 namespace asio = boost::asio;
 
-/// Requests to read calibrations that may wait for the worker at the same time.
-constexpr int kMaxReading = 16;
+/// Requests to read calibrations and references that may wait at the same time: half of what the
+/// pipeline takes, so that commands have room beside them.
+constexpr int kMaxReading = 8;
 
 constexpr const char* kChanging =
     "another calibration or way to make depth is coming into use: ask again in a moment";
@@ -72,15 +73,26 @@ CalibrationCommands::CalibrationCommands(asio::io_context& io, asio::thread_pool
 }
 
 template <typename Work, typename Done>
-void CalibrationCommands::on_worker(Work work, Done done) {
+std::function<void()> CalibrationCommands::job(Work work, Done done) {
   // The guard keeps the network thread's loop alive until the result has come back.
-  asio::post(worker_, [guard = asio::make_work_guard(io_), weak = weak_from_this(),
-                       work = std::move(work), done = std::move(done)]() mutable {
+  return [guard = asio::make_work_guard(io_), weak = weak_from_this(), work = std::move(work),
+          done = std::move(done)]() mutable {
     asio::post(guard.get_executor(),
                [weak = std::move(weak), done = std::move(done), result = work()]() mutable {
-                 if (const auto self = weak.lock()) done(*self, std::move(result));
+                 const auto self = weak.lock();
+                 if (self == nullptr) return;
+                 self->working_ = false;
+                 done(*self, std::move(result));
+                 self->next_job();
                });
-  });
+  };
+}
+
+void CalibrationCommands::next_job() {
+  if (working_ || waiting_.empty()) return;
+  working_ = true;
+  asio::post(worker_, std::move(waiting_.front()));
+  waiting_.pop_front();
 }
 
 void CalibrationCommands::get(const Requester& requester, const v1::GetCalibration& request) {
@@ -182,7 +194,7 @@ void CalibrationCommands::change(const Requester& requester, Change change) {
   using Ready = pipeline::UseCalibration;
   const pipeline::Status now = port_.status();
   const calibration::FrameSize camera{now.camera.width, now.camera.height};
-  on_worker(
+  first_on_worker(
       [&store = store_, &port = port_, change, rules = now.reconstruction, camera] {
         auto ready = attempt<Ready>(v1::ERROR_INVALID, [&] {
           return port.prepare(change.upload != nullptr ? store.check(*change.upload, camera)
@@ -217,7 +229,7 @@ void CalibrationCommands::keep(const WeakWho& requester, const Change& change) {
   }
   // Stored only after the pipeline has accepted it, so that a calibration that does not fit
   // this camera never replaces one that does.
-  on_worker(
+  first_on_worker(
       [&store = store_, change] {
         return attempt<std::uint64_t>(v1::ERROR_STORAGE, [&] {
           if (change.upload != nullptr) return store.keep(*change.upload);
@@ -275,7 +287,7 @@ void CalibrationCommands::set_reconstruction(const Requester& requester,
   if (changing_) return session->reply_error(id, v1::ERROR_BUSY, kChanging);
   changing_ = true;
   using Ready = pipeline::SetReconstruction;
-  on_worker(
+  first_on_worker(
       [&port = port_, in_use = now.calibration, rules] {
         return attempt<Ready>(v1::ERROR_INVALID, [&] { return port.prepare_maps(in_use, rules); });
       },

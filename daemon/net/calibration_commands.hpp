@@ -3,9 +3,12 @@
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/thread_pool.hpp>
 #include <cstdint>
+#include <deque>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "daemon/net/calibration_store.hpp"
 #include "daemon/net/request.hpp"
@@ -56,9 +59,22 @@ class CalibrationCommands : public std::enable_shared_from_this<CalibrationComma
   void send_reference(const Requester& requester,
                       const std::shared_ptr<const pipeline::ReferenceCopy>& reference);
   void report(const Change& change, std::optional<std::uint64_t> number);
-  /// Runs `work` on the worker and then `done`(*this, its result) here.
+  /// Runs `work` on the worker and then `done`(*this, its result) here, after what waits already.
   template <typename Work, typename Done>
-  void on_worker(Work work, Done done);
+  void on_worker(Work work, Done done) {
+    waiting_.push_back(job(std::move(work), std::move(done)));
+    next_job();
+  }
+  /// The same before all that waits: for what changes something, so that readers cannot delay it.
+  template <typename Work, typename Done>
+  void first_on_worker(Work work, Done done) {
+    waiting_.push_front(job(std::move(work), std::move(done)));
+    next_job();
+  }
+  template <typename Work, typename Done>
+  [[nodiscard]] std::function<void()> job(Work work, Done done);
+  /// Gives the worker the next job unless it has one.
+  void next_job();
 
   boost::asio::io_context& io_;
   boost::asio::thread_pool& worker_;
@@ -74,6 +90,8 @@ class CalibrationCommands : public std::enable_shared_from_this<CalibrationComma
   bool changing_ = false;
   std::uint64_t last_key_ = 0;  ///< The pipeline's key of the newest calibration.
   int reading_ = 0;
+  std::deque<std::function<void()>> waiting_;  ///< Jobs for the worker.
+  bool working_ = false;
 };
 
 }  // namespace dtact::net

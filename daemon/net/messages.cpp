@@ -24,6 +24,7 @@ static_assert(matches(Health::not_realtime, v1::HEALTH_NOT_REALTIME));
 static_assert(matches(Health::camera_shifted, v1::HEALTH_CAMERA_SHIFTED));
 static_assert(matches(Health::camera_slow, v1::HEALTH_CAMERA_SLOW));
 static_assert(matches(Health::exposure_unlocked, v1::HEALTH_EXPOSURE_UNLOCKED));
+static_assert(matches(Health::machine_slow, v1::HEALTH_MACHINE_SLOW));
 static_assert(pipeline::kHealthCount == v1::Health_MAX);
 
 v1::State to_wire(State state) {

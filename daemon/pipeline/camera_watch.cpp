@@ -40,12 +40,29 @@ bool RateWatch::slow() const noexcept {
   return kSlow * static_cast<double>(median_ns_) > static_cast<double>(promised_ns_);
 }
 
+void SkipWatch::add(const hal::FrameInfo& info) noexcept {
+  const bool goes_on = have_before_ && info.sequence > sequence_;
+  const std::uint64_t passed = goes_on ? info.sequence - sequence_ : 0;
+  sequence_ = info.sequence;
+  if (!std::exchange(have_before_, true)) began_ns_ = info.timestamp_ns;
+  frames_ += passed;
+  // A gap in which the camera lost frames says nothing about this machine.
+  if (passed > 1 && (info.flags & hal::kFrameAfterGap) == 0) skipped_ += passed - 1;
+  if (info.timestamp_ns - began_ns_ < kWindowNs) return;
+  behind_ = static_cast<double>(skipped_) > kMaxSkipped * static_cast<double>(frames_);
+  began_ns_ = info.timestamp_ns;
+  frames_ = 0;
+  skipped_ = 0;
+}
+
 bool CameraWatch::arrived(const hal::FrameInfo& info, std::int64_t now_ns) noexcept {
   const bool was_away = std::exchange(away_, false);
   const bool returned = was_away || (info.flags & hal::kFrameReopened) != 0;
   if ((info.flags & hal::kFrameAfterGap) != 0) lose(now_ns);
   if (returned) rate_.forget();
+  if (returned) skips_.forget();
   rate_.add(info);
+  skips_.add(info);
   last_ns_ = now_ns;
   stalled_ = false;
   damaged_ = false;

@@ -44,6 +44,30 @@ class RateWatch {
   std::int64_t timestamp_ns_ = 0;
 };
 
+/// Whether this machine keeps up with the camera: counts the frames that were skipped for newer
+/// ones, over two seconds of frame timestamps at a time. One thread.
+class SkipWatch {
+ public:
+  void add(const hal::FrameInfo& info) noexcept;
+  /// The camera was reopened: sequence numbers start again.
+  void forget() noexcept { *this = {}; }
+  /// Of the last two seconds' frames more than kMaxSkipped were skipped.
+  [[nodiscard]] bool behind() const noexcept { return behind_; }
+
+  /// Other programs delay a machine that is fast enough by a few frames now and then.
+  static constexpr double kMaxSkipped = 0.2;
+
+ private:
+  static constexpr std::int64_t kWindowNs = 2'000'000'000;
+
+  bool have_before_ = false;
+  std::uint64_t sequence_ = 0;  // the previous frame's
+  std::int64_t began_ns_ = 0;   // of the window
+  std::uint64_t frames_ = 0;    // processed or skipped since then
+  std::uint64_t skipped_ = 0;
+  bool behind_ = false;
+};
+
 /// The health flags that follow from the latest grab() results. One thread.
 class CameraWatch {
  public:
@@ -72,12 +96,14 @@ class CameraWatch {
     return lost_ && now_ns - lost_ns_ < 1'000'000'000;
   }
   [[nodiscard]] const RateWatch& rate() const noexcept { return rate_; }
+  [[nodiscard]] const SkipWatch& skips() const noexcept { return skips_; }
 
  private:
   void lose(std::int64_t now_ns) noexcept;
 
   std::int64_t period_ns_;
   RateWatch rate_;
+  SkipWatch skips_;
   std::int64_t last_ns_ = 0;
   std::int64_t lost_ns_ = 0;
   bool lost_ = false;

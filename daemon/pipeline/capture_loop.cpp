@@ -4,6 +4,9 @@
 #include <cmath>
 #include <utility>
 
+#include "hal/base/realtime_throttle.hpp"
+#include "hal/base/rt_thread.hpp"
+
 namespace dtact::pipeline {
 namespace {
 
@@ -12,6 +15,8 @@ constexpr std::int64_t kSecond = 1'000'000'000;
 constexpr std::chrono::milliseconds kLongestGrab{100};
 /// Pause before the next grab() from a camera that is away.
 constexpr std::int64_t kAwayPauseNs = 20'000'000;
+/// For the rest of the machine, ten times a second, when the camera is faster than this thread.
+constexpr std::chrono::milliseconds kPause{10};
 
 }  // namespace
 
@@ -44,7 +49,12 @@ CaptureLoop::CaptureLoop(const CaptureParts& parts, const PipelineConfig& config
 
 void CaptureLoop::run() noexcept {
   watch_.started(clock_.monotonic_ns());
-  while (!exchange_.stop.load(std::memory_order_relaxed)) step();
+  base::RealtimeThrottle throttle(clock_, kPause);
+  while (!exchange_.stop.load(std::memory_order_relaxed)) {
+    step();
+    throttle.pause_if_busy();
+    if (base::was_demoted()) exchange_.not_realtime.store(true, std::memory_order_relaxed);
+  }
   frame_.reset();
 }
 
@@ -234,6 +244,7 @@ HealthSet CaptureLoop::health(std::int64_t now_ns) const noexcept {
   set.set(Health::frames_lost, watch_.lost_lately(now_ns));
   set.set(Health::camera_fault, watch_.trouble());
   set.set(Health::camera_slow, watch_.rate().slow());
+  set.set(Health::machine_slow, watch_.skips().behind());
   set.set(Health::ring_fault, light_.trouble());
   set.set(Health::not_realtime, exchange_.not_realtime.load(std::memory_order_relaxed));
   return set;

@@ -39,10 +39,11 @@ enum class Health : std::uint8_t {
   image_repeated = 17,   ///< All or part of the picture is the one before: frozen or torn.
   camera_shifted =
       18,  ///< The gel's marks lie elsewhere than at calibration (camera_shift_detector.hpp).
-  camera_slow = 19,       ///< Fewer frames a second than the camera's mode promises.
-  exposure_unlocked = 20  ///< The rest brightens as a part darkens, as if exposure were automatic.
+  camera_slow = 19,        ///< Fewer frames a second than the camera's mode promises.
+  exposure_unlocked = 20,  ///< The rest brightens as a part darkens, as if exposure were automatic.
+  machine_slow = 21  ///< Frames come faster than this machine processes them; many are skipped.
 };
-inline constexpr int kHealthCount = 21;
+inline constexpr int kHealthCount = 22;
 
 class HealthSet {
  public:

@@ -2,6 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <string_view>
+
 #include "daemon/serve/private_file.hpp"
 #include "proto/dtact.pb.h"
 
@@ -14,7 +17,7 @@ std::optional<Tokens> read_tokens(const NetConfig& config) {
 
 Admission::Admission(const NetConfig& config) : config_(config), tokens_(read_tokens(config)) {}
 
-Admission::Verdict Admission::enter(const Peer& peer, const std::string& token) {
+Admission::Verdict Admission::judge(const Peer& peer, const std::string& token) {
   Verdict verdict;
   if (!tokens_.has_value() || peer.trusted) {
     verdict.rights = Rights::control;
@@ -27,10 +30,12 @@ Admission::Verdict Admission::enter(const Peer& peer, const std::string& token) 
                                        "in the daemon's token file"
                                      : "this daemon does not know the token: take one of those in "
                                        "the daemon's token file";
+    verdict.delay = token.empty() ? kDenial : delay_after_wrong(peer.host);
     return verdict;
   }
-  std::size_t& of_host = hosts_[peer.host];
-  if (clients_ >= config_.max_clients) {
+  const auto found = hosts_.find(peer.host);
+  const std::size_t of_host = found == hosts_.end() ? 0 : found->second;
+  if (clients_ >= config_.max_clients + (peer.trusted ? kReserved : 0)) {
     verdict.sentence = fmt::format(
         "{} clients are connected and no more are allowed: end one or raise the daemon's "
         "max_clients",
@@ -41,14 +46,32 @@ Admission::Verdict Admission::enter(const Peer& peer, const std::string& token) 
         "max_clients_per_address",
         of_host, peer.host);
   } else {
-    ++clients_;
-    ++of_host;
     return verdict;
   }
-  if (of_host == 0) hosts_.erase(peer.host);
   verdict.rights.reset();
   verdict.error_code = v1::ERROR_BUSY;
   return verdict;
+}
+
+Admission::Verdict Admission::enter(const Peer& peer, const std::string& token) {
+  Verdict verdict = judge(peer, token);
+  if (verdict.rights) {
+    ++clients_;
+    ++hosts_[peer.host];
+  }
+  return verdict;
+}
+
+std::chrono::milliseconds Admission::delay_after_wrong(const std::string& host) {
+  const auto now = Clock::now();
+  std::erase_if(wrong_, [&](const auto& one) { return now - one.second.last > kForgetWrong; });
+  if (wrong_.size() >= kMaxWrongHosts && !wrong_.contains(host)) {
+    wrong_.erase(
+        std::ranges::min_element(wrong_, {}, [](const auto& one) { return one.second.last; }));
+  }
+  Wrong& wrong = wrong_[host];
+  wrong.last = now;
+  return std::min(kMaxDenial, kDenial * (1U << std::min(wrong.count++, 16U)));
 }
 
 void Admission::leave(const Peer& peer) {
@@ -60,6 +83,37 @@ void Admission::leave(const Peer& peer) {
 bool Admission::hold(std::size_t before, std::size_t now) noexcept {
   incoming_ = incoming_ - before + now;
   return now <= before || incoming_ <= kMaxIncoming;
+}
+
+void Admission::unread(const void* client, const std::string& host, std::size_t bytes,
+                       std::function<void()> give_up) {
+  if (const auto found = unread_.find(client); found != unread_.end()) {
+    unread_bytes_ -= found->second.bytes;
+    unread_.erase(found);
+  }
+  if (bytes == 0) return;
+  unread_[client] = {host, bytes, std::move(give_up)};
+  unread_bytes_ += bytes;
+  while (unread_bytes_ > kMaxUnread) {
+    const auto worst = worst_beside(client);
+    if (worst == unread_.end()) return;  // one alone has at most Outbox::kMaxBytes and a message
+    const auto end = std::move(worst->second.give_up);
+    unread_bytes_ -= worst->second.bytes;
+    unread_.erase(worst);
+    end();
+  }
+}
+
+Admission::UnreadMap::iterator Admission::worst_beside(const void* asking) {
+  std::map<std::string_view, std::size_t> hosts;
+  for (const auto& [client, one] : unread_) hosts[one.host] += one.bytes;
+  auto worst = unread_.end();
+  const auto weight = [&](const Unread& one) { return std::pair(hosts[one.host], one.bytes); };
+  for (auto it = unread_.begin(); it != unread_.end(); ++it) {
+    if (it->first == asking) continue;
+    if (worst == unread_.end() || weight(it->second) > weight(worst->second)) worst = it;
+  }
+  return worst;
 }
 
 }  // namespace dtact::net

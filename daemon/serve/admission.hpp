@@ -1,6 +1,8 @@
 #pragma once
 
+#include <chrono>
 #include <cstddef>
+#include <functional>
 #include <map>
 #include <optional>
 #include <string>
@@ -23,6 +25,16 @@ class Admission {
   /// Bytes of large messages that have arrived in part, of all clients together: two of the
   /// longest.
   static constexpr std::size_t kMaxIncoming = std::size_t{32} << 20U;
+  /// Bytes of large answers that lie unread, of all clients together: two of the longest.
+  static constexpr std::size_t kMaxUnread = std::size_t{32} << 20U;
+  /// Delay of the answer to an address's first wrong token. It doubles with each further one.
+  static constexpr std::chrono::milliseconds kDenial{500};
+  static constexpr std::chrono::milliseconds kMaxDenial{16'000};
+  /// After this time without a wrong token the next one counts as the first.
+  static constexpr std::chrono::minutes kForgetWrong{10};
+  /// Places above NetConfig::max_clients for those with Peer.trusted, so that root reaches a full
+  /// daemon.
+  static constexpr std::size_t kReserved = 4;
 
   /// Throws as read_tokens().
   explicit Admission(const NetConfig& config);
@@ -35,7 +47,12 @@ class Admission {
     int error_code = 0;            ///< … as ERROR_DENIED or ERROR_BUSY, …
     std::string sentence;          ///< … because of this.
     std::string token_name;        ///< What the token file calls the token.
+    /// ERROR_DENIED is to be answered after this, so that guessing takes its time: twice as long
+    /// after each wrong token of the same Peer.host. Right ones are never delayed.
+    std::chrono::milliseconds delay{0};
   };
+  /// What enter() would say, without counting the client.
+  [[nodiscard]] Verdict judge(const Peer& peer, const std::string& token);
   /// After a Hello with this token. Who is let in counts until leave().
   [[nodiscard]] Verdict enter(const Peer& peer, const std::string& token);
   void leave(const Peer& peer);
@@ -43,6 +60,11 @@ class Admission {
   /// A client's message takes `now` bytes instead of `before`. False when that is too much for all
   /// of them together; it counts all the same.
   [[nodiscard]] bool hold(std::size_t before, std::size_t now) noexcept;
+  /// `bytes` of the answers to `client`, of Peer.host `host`, lie unread. When all clients together
+  /// have more than kMaxUnread, others are given up: those with most of the host that has most.
+  /// `give_up` is called then, and has to end the connection.
+  void unread(const void* client, const std::string& host, std::size_t bytes,
+              std::function<void()> give_up);
 
  private:
   const NetConfig& config_;
@@ -50,6 +72,27 @@ class Admission {
   std::size_t clients_ = 0;
   std::map<std::string, std::size_t> hosts_;  ///< Clients by Peer.host.
   std::size_t incoming_ = 0;
+
+  using Clock = std::chrono::steady_clock;
+  struct Wrong {
+    unsigned count = 0;  ///< Wrong tokens, …
+    Clock::time_point last;
+  };
+  /// The address that showed one longest ago is forgotten for another.
+  static constexpr std::size_t kMaxWrongHosts = 1024;
+  [[nodiscard]] std::chrono::milliseconds delay_after_wrong(const std::string& host);
+  std::map<std::string, Wrong> wrong_;  ///< … by Peer.host.
+
+  struct Unread {
+    std::string host;
+    std::size_t bytes = 0;
+    std::function<void()> give_up;
+  };
+  using UnreadMap = std::map<const void*, Unread>;
+  /// The client to give up for `asking`; end(): there is no other.
+  [[nodiscard]] UnreadMap::iterator worst_beside(const void* asking);
+  UnreadMap unread_;  ///< By client, without those that have nothing unread.
+  std::size_t unread_bytes_ = 0;
 };
 
 }  // namespace dtact::net

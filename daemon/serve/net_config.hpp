@@ -38,7 +38,8 @@ struct NetConfig {
   std::filesystem::path tls_key;
   /// See Tokens. With it every client needs a token, but for Peer.trusted; without it none does.
   std::filesystem::path token_file;
-  std::size_t max_clients = 32;              ///< More are refused with a sentence.
+  /// More are refused with a sentence; see Admission::kReserved.
+  std::size_t max_clients = 32;
   std::size_t max_clients_per_address = 16;  ///< The same for each Peer.host.
   /// Rate limit of one client, and its burst. A request counts once for each 64 kB of it.
   int max_requests_per_s = 500;

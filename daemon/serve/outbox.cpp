@@ -28,6 +28,7 @@ bool Outbox::push(const v1::ServerMessage& message, bool first) {
   std::string bytes = framed(message);
   control_bytes_ += bytes.size();
   control_.insert(first ? control_.begin() : control_.end(), std::move(bytes));
+  owner_.on_waiting_changed();
   if (!writing_) write_next();
   return true;
 }
@@ -65,7 +66,8 @@ void Outbox::write_control() {
                    [this, held = owner_.hold()](const error_code& error, std::size_t size) {
                      if (closed_) return;
                      control_bytes_ -= sending_control_.size();
-                     sending_control_.clear();
+                     sending_control_ = std::string();  // returns its memory, unlike clear()
+                     owner_.on_waiting_changed();
                      on_written(error, size);
                    });
 }

@@ -40,6 +40,8 @@ class Outbox {
     virtual std::shared_ptr<void> hold() = 0;
     /// A write failed; nothing more can be sent.
     virtual void on_write_failed(const std::string& reason) = 0;
+    /// waiting_bytes() has changed.
+    virtual void on_waiting_changed() = 0;
   };
 
   Outbox(Transport& transport, Owner& owner) : transport_(transport), owner_(owner) {}

@@ -18,8 +18,6 @@ using boost::system::error_code;
 
 /// How long an ending connection may take to fetch its last answer.
 constexpr std::chrono::milliseconds kLinger{2000};
-/// Delay of the answer to a wrong token.
-constexpr std::chrono::milliseconds kDenial{500};
 /// How long a large message may take to arrive: the longest at 1.1 Mbit/s.
 constexpr std::chrono::milliseconds kArrival{120'000};
 /// Bytes of a message that count neither as large nor as a second request.
@@ -194,10 +192,11 @@ void Session::on_hello(std::uint64_t id, const v1::Hello& hello) {
                                    hello.token().size(), wire::kMaxToken));
   }
   const auto verdict = admission_.enter(peer(), hello.token());
-  if (verdict.error_code == v1::ERROR_DENIED) return deny(id, verdict.sentence);
+  if (verdict.error_code == v1::ERROR_DENIED) return deny(id, verdict);
   // It is the connection that is refused, as by daemons that said so before Hello: id 0.
   if (!verdict.rights) return end_with(0, verdict.error_code, verdict.sentence);
   rights_ = verdict.rights;
+  token_name_ = verdict.token_name;
   timer_.cancel();
   state_ = State::ready;
   decoder_.set_cap(wire::kMaxMessage);
@@ -227,12 +226,13 @@ void Session::on_hello(std::uint64_t id, const v1::Hello& hello) {
   if (host != nullptr) host->on_authenticated();
 }
 
-void Session::deny(std::uint64_t id, const std::string& sentence) {
+void Session::deny(std::uint64_t id, const Admission::Verdict& verdict) {
   state_ = State::denied;
-  timer_.expires_after(kDenial);
-  timer_.async_wait([self = shared_from_this(), id, sentence](const error_code& error) {
-    if (!error && self->state_ == State::denied) self->end_with(id, v1::ERROR_DENIED, sentence);
-  });
+  timer_.expires_after(verdict.delay);
+  timer_.async_wait(
+      [self = shared_from_this(), id, sentence = verdict.sentence](const error_code& error) {
+        if (!error && self->state_ == State::denied) self->end_with(id, v1::ERROR_DENIED, sentence);
+      });
 }
 
 void Session::reply_error(std::uint64_t id, int error_code_, const std::string& sentence) {
@@ -272,6 +272,14 @@ void Session::send(const v1::ServerMessage& message, bool first) {
   }
 }
 
+void Session::on_waiting_changed() {
+  const std::size_t bytes = outbox_.waiting_bytes() > kSmall ? outbox_.waiting_bytes() : 0;
+  admission_.unread(this, peer().host, bytes, [this] {
+    close("the unread answers of all clients took too much memory, most of it here",
+          LogLevel::warning);
+  });
+}
+
 void Session::subscribe(const Subscription& subscription) {
   subscription_ = subscription;
   outbox_.drop_frame();
@@ -306,6 +314,7 @@ void Session::close(const std::string& reason, LogLevel level) {
   state_ = State::closed;
   if (rights_) admission_.leave(peer());
   (void)admission_.hold(std::exchange(held_, 0), 0);
+  admission_.unread(this, peer().host, 0, {});
   transport_->close();
   timer_.cancel();
   outbox_.close();

@@ -82,6 +82,8 @@ class Session : public std::enable_shared_from_this<Session>, private Outbox::Ow
   }
   /// Once it is greeted; before that it has the least.
   [[nodiscard]] Rights rights() const noexcept { return rights_.value_or(Rights::view); }
+  /// What the token file calls its token; empty where it needed none or it has no name.
+  [[nodiscard]] const std::string& token_name() const noexcept { return token_name_; }
   [[nodiscard]] const Peer& peer() const noexcept { return transport_->peer(); }
   [[nodiscard]] const std::string& program() const noexcept { return program_; }
   /// The outbox in the client's protocol version.
@@ -104,11 +106,12 @@ class Session : public std::enable_shared_from_this<Session>, private Outbox::Ow
   void on_message();
   void on_hello(std::uint64_t id, const v1::Hello& hello);
   /// Answers after a while, so that guessing takes its time, and ends.
-  void deny(std::uint64_t id, const std::string& sentence);
+  void deny(std::uint64_t id, const Admission::Verdict& verdict);
   /// Sends an error as the last answer and ends.
   void end_with(std::uint64_t id, int error_code, const std::string& sentence);
   std::shared_ptr<void> hold() override { return shared_from_this(); }
   void on_write_failed(const std::string& reason) override { close(reason); }
+  void on_waiting_changed() override;
 
   std::unique_ptr<Transport> transport_;
   Outbox outbox_;
@@ -124,6 +127,7 @@ class Session : public std::enable_shared_from_this<Session>, private Outbox::Ow
       false;  ///< The last frame was not made, since the reader has stopped.
 
   std::optional<Rights> rights_;  ///< Once it is let in.
+  std::string token_name_;
   TokenBucket requests_;
   std::vector<char> input_;
   wire::MessageDecoder decoder_{wire::kMaxBeforeHello};

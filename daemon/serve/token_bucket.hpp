@@ -13,12 +13,12 @@ class TokenBucket {
   TokenBucket(double per_second, double burst, Clock::time_point now = Clock::now())
       : per_second_(per_second), burst_(burst), left_(burst), then_(now) {}
 
-  /// False, and nothing is taken, when fewer are left.
-  [[nodiscard]] bool take(double cost, Clock::time_point now = Clock::now()) {
+  /// False, and nothing is taken, when fewer would be left than `reserve`.
+  [[nodiscard]] bool take(double cost, double reserve = 0, Clock::time_point now = Clock::now()) {
     left_ =
         std::min(burst_, left_ + per_second_ * std::chrono::duration<double>(now - then_).count());
     then_ = now;
-    if (left_ < cost) return false;
+    if (left_ < cost + reserve) return false;
     left_ -= cost;
     return true;
   }

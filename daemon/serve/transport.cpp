@@ -34,6 +34,8 @@ asio::ip::address unmapped(const asio::ip::address& address) {
 }
 
 std::string host_of(const asio::ip::address& address) {
+  // Any program may take any address of 127.0.0.0/8.
+  if (address.is_loopback()) return "this machine";
   if (address.is_v4()) return address.to_string();
   auto bytes = address.to_v6().to_bytes();
   std::fill(bytes.begin() + 8, bytes.end(), std::uint8_t{0});
@@ -152,7 +154,9 @@ std::unique_ptr<Transport> over_tcp(tcp::socket socket, Peer peer,
 std::unique_ptr<Transport> over_unix(Unix::socket socket, std::string endpoint) {
   const PeerCredentials peer = peer_credentials(socket.native_handle());
   return std::make_unique<StreamTransport<Unix::socket>>(
-      Peer{peer.text, std::move(endpoint), fmt::format("uid {}", peer.uid), peer.trusted},
+      Peer{peer.text, std::move(endpoint),
+           fmt::format("uid {}{}", peer.uid, peer.trusted ? " (needs no token)" : ""),
+           peer.trusted},
       std::move(socket));
 }
 

@@ -18,8 +18,8 @@ namespace dtact::net {
 struct Peer {
   std::string address;   ///< For logs and status: "192.168.1.7:40312", "pid 811 (uid 1000)".
   std::string endpoint;  ///< The Endpoint.address it came by.
-  /// What limits for each address count: the IPv4 address, the first half of an IPv6 one, which is
-  /// what one network has at least, or the user.
+  /// What limits for each address count: "this machine" for every loopback address, the IPv4
+  /// address, the first half of an IPv6 one, which is what one network has at least, or the user.
   std::string host;
   /// The kernel says that it is root, the daemon's own user or of the daemon's group: it needs no
   /// token.

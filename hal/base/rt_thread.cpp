@@ -4,8 +4,10 @@
 #include <pthread.h>
 #include <sched.h>
 #include <sys/mman.h>
+#include <sys/resource.h>
 
 #include <cerrno>
+#include <csignal>
 #include <cstring>
 #include <exception>
 #include <memory>
@@ -26,6 +28,21 @@ std::string fifo_refused(const std::string& name, int priority, int error) {
       "thread {} runs without SCHED_FIFO priority {} ({}): give the user an rtprio limit "
       "(LimitRTPRIO={} in the unit, or /etc/security/limits.d)",
       name, priority, std::strerror(error), priority);
+}
+
+rlimit rttime_limit{};
+thread_local volatile std::sig_atomic_t demoted = 0;
+
+/// The kernel sends SIGXCPU to the thread that has run for too long.
+void demote(int /*signal*/) {
+  const int error = errno;
+  const sched_param parameters{.sched_priority = 0};
+  // An unprivileged thread may not take RESET_ON_FORK back (sched(7)).
+  (void)::sched_setscheduler(0, SCHED_OTHER | SCHED_RESET_ON_FORK, &parameters);
+  // The kernel has raised the soft limit, maybe above the hard one, where it warns nobody.
+  (void)::setrlimit(RLIMIT_RTTIME, &rttime_limit);
+  demoted = 1;
+  errno = error;
 }
 
 }  // namespace
@@ -136,6 +153,16 @@ std::optional<std::string> make_fifo(const std::string& name, int priority) {
   }
   return fifo_refused(name, priority, errno);
 }
+
+void demote_at_rttime_limit() noexcept {
+  ::getrlimit(RLIMIT_RTTIME, &rttime_limit);
+  struct sigaction action{};
+  action.sa_handler = demote;
+  action.sa_flags = SA_RESTART;
+  ::sigaction(SIGXCPU, &action, nullptr);
+}
+
+bool was_demoted() noexcept { return demoted != 0; }
 
 std::optional<std::string> lock_memory() {
   // ONFAULT: pages are locked at first access, so unused reserve costs nothing.

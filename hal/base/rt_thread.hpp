@@ -58,6 +58,13 @@ void run_unpinned(const cpu_set_t& cpus, const std::function<void()>& body);
 /// nothing. `name` is how that sentence calls the thread.
 [[nodiscard]] std::optional<std::string> make_fifo(const std::string& name, int priority);
 
+/// From now on a real-time thread that has run for the soft limit of RLIMIT_RTTIME without waiting
+/// goes on with normal scheduling; without this call the kernel ends the process. The unit's
+/// LimitRTTIME= has to have a soft limit below its hard one.
+void demote_at_rttime_limit() noexcept;
+/// That has happened to the calling thread.
+[[nodiscard]] bool was_demoted() noexcept;
+
 /// Locks the process's memory page by page at first access (MCL_CURRENT | MCL_FUTURE |
 /// MCL_ONFAULT). Returns the reason for a failure with its fix, or nothing.
 [[nodiscard]] std::optional<std::string> lock_memory();

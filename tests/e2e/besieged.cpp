@@ -93,7 +93,8 @@ std::string HonestClient::broken() const {
   return broken_;
 }
 
-Besieged::Besieged() : honest_(sensor_.connect("honest")) {}
+Besieged::Besieged(const std::vector<std::string>& settings)
+    : sensor_({}, true, settings), honest_(sensor_.connect("honest")) {}
 
 Besieged::Missed Besieged::missed() const {
   const v1::Status status = sensor_.connect("asking").status();

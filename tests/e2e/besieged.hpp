@@ -60,7 +60,8 @@ class HonestClient {
 /// A daemon on the simulated sensor with an honest client, before and after an attack.
 class Besieged {
  public:
-  Besieged();
+  /// `settings`: of the daemon, KEY=VALUE.
+  explicit Besieged(const std::vector<std::string>& settings = {});
 
   [[nodiscard]] std::uint16_t port() const { return sensor_.daemon->port(); }
   [[nodiscard]] const Sensor& sensor() const { return sensor_; }

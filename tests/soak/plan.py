@@ -29,7 +29,7 @@ CLEARED = (14.5, 16.0)
 #: Flags that a busy machine raises by itself: frames that the simulated camera could not make in time, and
 #: threads that did not run in time or without real-time scheduling. Counted, not faults; frames_lost and
 #: camera_fault are compared with the frames that came (checks.py).
-MACHINE = frozenset({"frames_lost", "camera_slow", "camera_fault", "not_realtime"})
+MACHINE = frozenset({"frames_lost", "camera_slow", "machine_slow", "camera_fault", "not_realtime"})
 #: Faults under which frames do not come.
 SWALLOWING = frozenset({"unplug", "stall", "hang", "drop", "truncate"})
 #: The daemon reports lost frames for this long.

@@ -171,7 +171,7 @@ TEST(GetCalibration, TakesANumber) {
   EXPECT_EQ(client.request(get_calibration()).calibration().number(), 1U);
 }
 
-// At most 16 may wait; answered ones don't count.
+// At most 8 may wait; answered ones don't count.
 TEST(GetCalibration, OneAfterAnotherAreNeverTooMany) {
   Rig rig;
   RawClient client(rig.tcp_port());

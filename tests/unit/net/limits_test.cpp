@@ -2,9 +2,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <poll.h>
+#include <sys/stat.h>
 
 #include <algorithm>
+#include <boost/asio/io_context.hpp>
 #include <chrono>
+#include <deque>
 #include <memory>
 #include <string>
 #include <thread>
@@ -15,6 +18,8 @@
 #include "daemon/serve/limited_log.hpp"
 #include "daemon/serve/session_list.hpp"
 #include "daemon/serve/token_bucket.hpp"
+#include "hal/base/atomic_file.hpp"
+#include "tests/unit/calibration/sample.hpp"
 #include "tests/unit/net/raw_client.hpp"
 #include "tests/unit/net/requests.hpp"
 #include "tests/unit/net/rig.hpp"
@@ -26,30 +31,26 @@ using testing::HasSubstr;
 using namespace std::string_literals;
 using std::chrono::milliseconds;
 
-/// A connection from an address of this machine other than 127.0.0.1.
-base::UniqueFd connected_from(const char* from, std::uint16_t port) {
-  base::UniqueFd fd(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0));
-  sockaddr_in address{};
-  address.sin_family = AF_INET;
-  ::inet_pton(AF_INET, from, &address.sin_addr);
-  const auto* generic = reinterpret_cast<const sockaddr*>(&address);
-  if (::bind(fd.get(), generic, sizeof address) != 0) throw std::runtime_error("cannot bind");
-  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-  address.sin_port = htons(port);
-  if (::connect(fd.get(), generic, sizeof address) != 0) throw std::runtime_error("cannot connect");
-  return fd;
-}
-
 TEST(TokenBucket, FillsUpToItsBurst) {
   const TokenBucket::Clock::time_point start;
   TokenBucket bucket(10, 3, start);
-  EXPECT_TRUE(bucket.take(2, start));
-  EXPECT_TRUE(bucket.take(1, start));
-  EXPECT_FALSE(bucket.take(1, start));
-  EXPECT_FALSE(bucket.take(1, start + milliseconds(99)));
-  EXPECT_TRUE(bucket.take(1, start + milliseconds(100)));
-  EXPECT_FALSE(bucket.take(4, start + std::chrono::hours(1)));
-  EXPECT_TRUE(bucket.take(3, start + std::chrono::hours(1)));
+  EXPECT_TRUE(bucket.take(2, 0, start));
+  EXPECT_TRUE(bucket.take(1, 0, start));
+  EXPECT_FALSE(bucket.take(1, 0, start));
+  EXPECT_FALSE(bucket.take(1, 0, start + milliseconds(99)));
+  EXPECT_TRUE(bucket.take(1, 0, start + milliseconds(100)));
+  EXPECT_FALSE(bucket.take(4, 0, start + std::chrono::hours(1)));
+  EXPECT_TRUE(bucket.take(3, 0, start + std::chrono::hours(1)));
+}
+
+TEST(TokenBucket, KeepsAReserve) {
+  const TokenBucket::Clock::time_point start;
+  TokenBucket bucket(10, 5, start);
+  EXPECT_TRUE(bucket.take(1, 4, start));
+  EXPECT_FALSE(bucket.take(1, 4, start));
+  EXPECT_TRUE(bucket.take(4, 0, start));
+  EXPECT_FALSE(bucket.take(1, 4, start + milliseconds(499)));
+  EXPECT_TRUE(bucket.take(1, 4, start + milliseconds(500)));
 }
 
 TEST(LimitedLog, SaysHowManyLinesItLeftOut) {
@@ -77,31 +78,67 @@ TEST(BeforeHello, TakesAKilobyteAndNoMore) {
   EXPECT_TRUE(longer.ends());
 }
 
-TEST(BeforeHello, AFloodLeavesRoomForOthers) {
+/// A connection from `host` that sends nothing. `closed` is set when it is closed.
+class SilentTransport : public Transport {
+ public:
+  SilentTransport(boost::asio::io_context& io, const std::string& host, bool& closed)
+      : Transport({host + ":4711", "127.0.0.1:7377", host, false}), io_(io), closed_(closed) {}
+
+  void handshake(std::function<void(const boost::system::error_code&)>) override {}
+  void read_some(boost::asio::mutable_buffer, Done) override {}
+  void write(const Parts&, Done) override {}
+  void shutdown_send(std::shared_ptr<void>) override {}
+  void close() override { closed_ = true; }
+  boost::asio::any_io_executor executor() override { return io_.get_executor(); }
+
+ private:
+  boost::asio::io_context& io_;
+  bool& closed_;
+};
+
+/// Connections that have not said Hello, with the host that each came from.
+class BeforeHelloList : public ::testing::Test {
+ protected:
+  void connect(const std::string& host) {
+    list_.admit(std::make_shared<Session>(
+        std::make_unique<SilentTransport>(io_, host, closed.emplace_back()), config_, admission_,
+        std::weak_ptr<SessionHost>()));
+  }
+  std::deque<bool> closed;  ///< In the order of connect().
+
+ private:
+  boost::asio::io_context io_;
+  NetConfig config_;
+  Admission admission_{config_};
+  SessionList list_;
+};
+
+TEST_F(BeforeHelloList, AFloodFromOneAddressLeavesRoomForOthers) {
+  connect("192.0.2.1");
+  for (std::size_t i = 0; i < 3 * SessionList::kMaxUnauthenticated; ++i) connect("192.0.2.2");
+  connect("192.0.2.3");
+  EXPECT_FALSE(closed.front()) << "it came before";
+  EXPECT_FALSE(closed.back()) << "it came after";
+  EXPECT_TRUE(closed[1]);
+  EXPECT_FALSE(closed[closed.size() - 2]);
+}
+
+TEST_F(BeforeHelloList, AFloodFromEverywhereTakesTheOldestOnesPlace) {
+  for (std::size_t i = 0; i <= SessionList::kMaxUnauthenticated; ++i) {
+    connect("192.0.2." + std::to_string(i));
+  }
+  EXPECT_TRUE(closed[0]);
+  EXPECT_EQ(std::ranges::count(closed, true), 1);
+}
+
+TEST(BeforeHello, AFloodOfConnectionsLeavesRoomForThoseThatSayHello) {
   const Rig rig;
   std::vector<std::unique_ptr<RawClient>> flood;
-  RawClient early{connected_from("127.0.0.2", rig.tcp_port())};
   for (std::size_t i = 0; i < 3 * SessionList::kMaxUnauthenticated; ++i) {
     flood.push_back(std::make_unique<RawClient>(rig.tcp_port()));
   }
-  // An earlier client from another address keeps its connection.
-  EXPECT_NO_THROW(early.hello());
-  RawClient late(rig.tcp_port());
-  EXPECT_NO_THROW(late.hello());
   EXPECT_TRUE(flood.front()->ends());
   EXPECT_NO_THROW(flood.back()->hello());
-}
-
-TEST(BeforeHello, AFloodFromEverywhereTakesTheOldestOnesPlace) {
-  const Rig rig;
-  RawClient oldest{connected_from("127.0.9.9", rig.tcp_port())};
-  std::vector<std::unique_ptr<RawClient>> flood;
-  for (std::size_t i = 0; i < SessionList::kMaxUnauthenticated; ++i) {
-    const std::string from = "127.0.0." + std::to_string(i + 2);
-    flood.push_back(std::make_unique<RawClient>(connected_from(from.c_str(), rig.tcp_port())));
-  }
-  EXPECT_TRUE(oldest.ends());
-  for (auto& client : {flood.front().get(), flood[8].get()}) EXPECT_NO_THROW(client->hello());
 }
 
 TEST(Admission, CountsClientsOfEachAddress) {
@@ -115,14 +152,32 @@ TEST(Admission, CountsClientsOfEachAddress) {
   RawClient c(rig.tcp_port());
   const auto reply = c.say_hello();
   EXPECT_EQ(reply.error().code(), v1::ERROR_BUSY);
-  EXPECT_THAT(reply.error().message(), HasSubstr("2 clients are connected from 127.0.0.1"));
+  EXPECT_THAT(reply.error().message(), HasSubstr("2 clients are connected from this machine"));
   EXPECT_TRUE(c.ends());
-  RawClient other{connected_from("127.0.0.2", rig.tcp_port())};
-  EXPECT_NO_THROW(other.hello());
+  // Any program may take any of the sixteen million loopback addresses.
+  RawClient other{connected_from("127.8.0.2", rig.tcp_port())};
+  EXPECT_EQ(other.say_hello().error().code(), v1::ERROR_BUSY);
   b.reset();
   ASSERT_TRUE(rig.wait_log("the client left"));
   RawClient d(rig.tcp_port());
   EXPECT_NO_THROW(d.hello());
+}
+
+TEST(Admission, KeepsPlacesForThoseThatNeedNoToken) {
+  NetConfig config;
+  config.max_clients = 3;
+  Admission admission(config);
+  const Peer other{"192.0.2.1:4711", "0.0.0.0:7377", "192.0.2.1", false};
+  const Peer root{"pid 811 (uid 0)", "/run/dtactd/dtactd.sock", "uid 0 (needs no token)", true};
+  for (int i = 0; i < 3; ++i) EXPECT_EQ(admission.enter(other, "").rights, Rights::control);
+  EXPECT_EQ(admission.enter(other, "").error_code, v1::ERROR_BUSY);
+  for (std::size_t i = 0; i < Admission::kReserved; ++i) {
+    EXPECT_EQ(admission.enter(root, "").rights, Rights::control) << i;
+  }
+  EXPECT_EQ(admission.enter(root, "").error_code, v1::ERROR_BUSY);
+  admission.leave(root);
+  EXPECT_EQ(admission.enter(other, "").error_code, v1::ERROR_BUSY);
+  EXPECT_EQ(admission.enter(root, "").rights, Rights::control);
 }
 
 TEST(Requests, TooManyASecondAreAFlood) {
@@ -278,6 +333,78 @@ TEST(Incoming, IsCountedOnceAndGivenBack) {
   EXPECT_TRUE(admission.hold(1, 0));
   EXPECT_TRUE(admission.hold(kAll, 0));
   EXPECT_TRUE(admission.hold(0, kAll));
+}
+
+TEST(Unread, TheLargestOfTheGreediestAddressIsGivenUp) {
+  constexpr std::size_t kMiB = std::size_t{1} << 20U;
+  const NetConfig config;
+  Admission admission(config);
+  std::vector<int> gone;
+  const std::vector<int> clients{0, 1, 2, 3};
+  const auto unread = [&](std::size_t client, const std::string& host, std::size_t bytes) {
+    admission.unread(&clients[client], host, bytes,
+                     [&gone, client] { gone.push_back(static_cast<int>(client)); });
+  };
+  unread(0, "192.0.2.1", 15 * kMiB);
+  unread(1, "192.0.2.2", 9 * kMiB);
+  unread(2, "192.0.2.2", 8 * kMiB);
+  EXPECT_TRUE(gone.empty());
+  unread(3, "192.0.2.3", kMiB);
+  EXPECT_EQ(gone, std::vector{1});
+  // What was read is room again.
+  unread(0, "192.0.2.1", 0);
+  unread(1, "192.0.2.2", 16 * kMiB);
+  EXPECT_EQ(gone.size(), 1U);
+  // Who asks is not given up while there is another.
+  unread(1, "192.0.2.2", 32 * kMiB);
+  EXPECT_EQ(gone, (std::vector{1, 2, 3}));
+}
+
+TEST(Unread, LargeAnswersThatNobodyReadsAreBounded) {
+  Rig rig;
+  const CalibrationFiles large{
+      .name = "large", .toml = "toml", .png = std::string(15U << 20U, 'x')};
+  const std::uint64_t number = rig.store.keep(large);
+  v1::ClientMessage ask;
+  ask.mutable_get_calibration()->set_number(number);
+  std::vector<std::unique_ptr<RawClient>> silent;
+  for (int i = 0; i < 6; ++i) {
+    silent.push_back(std::make_unique<RawClient>(rig.tcp_port(), 4096));
+    silent.back()->hello();
+    ask.set_id(7);
+    silent.back()->send(ask);
+  }
+  RawClient reader(rig.tcp_port());
+  reader.hello();
+  EXPECT_EQ(reader.request(ask).calibration().reference_png().size(), 15U << 20U);
+  EXPECT_TRUE(rig.wait_log("the unread answers of all clients took too much memory"));
+  std::size_t waiting = 0;
+  const v1::Status status = rig.overview().status;
+  for (const auto& client : status.clients()) waiting += client.waiting_bytes();
+  EXPECT_LE(waiting, Admission::kMaxUnread);
+}
+
+TEST(WrongTokens, AreAnsweredLaterAndLater) {
+  using namespace std::chrono_literals;
+  const calibration::TempFolder folder;
+  NetConfig config;
+  config.token_file = folder.path() / "tokens";
+  base::write_file_atomically(config.token_file, "control 0123456789abcdef0123456789abcdef arm\n");
+  ::chmod(config.token_file.c_str(), 0600);
+  Admission admission(config);
+  const Peer guesser{"192.0.2.1:4711", "0.0.0.0:7377", "192.0.2.1", false};
+  const Peer other{"192.0.2.2:4711", "0.0.0.0:7377", "192.0.2.2", false};
+  std::vector<milliseconds> delays;
+  for (int i = 0; i < 8; ++i) {
+    const auto verdict = admission.enter(guesser, "guess");
+    EXPECT_EQ(verdict.error_code, v1::ERROR_DENIED);
+    delays.push_back(verdict.delay);
+  }
+  EXPECT_EQ(delays, (std::vector<milliseconds>{500ms, 1s, 2s, 4s, 8s, 16s, 16s, 16s}));
+  EXPECT_EQ(admission.enter(other, "guess").delay, 500ms);
+  EXPECT_EQ(admission.enter(guesser, "").delay, 500ms) << "none is no guess";
+  // A client that shares the address with a guesser is served at once.
+  EXPECT_EQ(admission.enter(guesser, "0123456789abcdef0123456789abcdef").rights, Rights::control);
 }
 
 TEST(Answers, AboveTheCapAreErrorsAndTheConnectionStays) {

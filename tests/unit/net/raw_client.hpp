@@ -4,9 +4,11 @@
 #include <netinet/in.h>
 #include <poll.h>
 #include <sys/socket.h>
+#include <sys/un.h>
 #include <unistd.h>
 
 #include <cerrno>
+#include <filesystem>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -18,6 +20,37 @@
 #include "proto/framing.hpp"
 
 namespace dtact::net::test {
+
+/// A connection from another address of this machine than 127.0.0.1, all of which reach it.
+[[nodiscard]] inline base::UniqueFd connected_from(const char* from, std::uint16_t port) {
+  base::UniqueFd fd(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0));
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  ::inet_pton(AF_INET, from, &address.sin_addr);
+  const auto* generic = reinterpret_cast<const sockaddr*>(&address);
+  if (::bind(fd.get(), generic, sizeof address) != 0) throw std::runtime_error("cannot bind");
+  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  address.sin_port = htons(port);
+  if (::connect(fd.get(), generic, sizeof address) != 0) throw std::runtime_error("cannot connect");
+  return fd;
+}
+
+[[nodiscard]] inline sockaddr_un address_of(const std::filesystem::path& path) {
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  path.native().copy(static_cast<char*>(address.sun_path), sizeof address.sun_path - 1);
+  return address;
+}
+
+/// A connection to a Unix socket.
+[[nodiscard]] inline base::UniqueFd connected(const std::filesystem::path& path) {
+  base::UniqueFd fd(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0));
+  const sockaddr_un address = address_of(path);
+  if (::connect(fd.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
+    throw std::runtime_error("cannot connect to " + path.string());
+  }
+  return fd;
+}
 
 /// A client that sends and reads exactly what a test says, right or wrong.
 class RawClient {

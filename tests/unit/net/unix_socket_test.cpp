@@ -24,22 +24,6 @@ using calibration::TempFolder;
 using testing::HasSubstr;
 using testing::StartsWith;
 
-sockaddr_un address_of(const fs::path& path) {
-  sockaddr_un address{};
-  address.sun_family = AF_UNIX;
-  path.native().copy(static_cast<char*>(address.sun_path), sizeof address.sun_path - 1);
-  return address;
-}
-
-base::UniqueFd connected(const fs::path& path) {
-  base::UniqueFd fd(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0));
-  const sockaddr_un address = address_of(path);
-  if (::connect(fd.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
-    throw std::runtime_error("cannot connect to " + path.string());
-  }
-  return fd;
-}
-
 v1::Status status_of(RawClient& client) {
   v1::ClientMessage message;
   message.mutable_get_status();

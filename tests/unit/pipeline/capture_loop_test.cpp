@@ -60,6 +60,20 @@ TEST(CaptureLoop, ACameraThatHalvesItsRateIsNamedWithoutLosses) {
   ASSERT_TRUE(loop.until([&] { return loop.health().empty(); }, 120));
 }
 
+TEST(CaptureLoop, AMachineThatCannotKeepUpIsNamed) {
+  SteppedLoop loop;
+  loop.begin(toy_calibration());
+  ASSERT_TRUE(loop.until_fresh());
+  ASSERT_TRUE(loop.until(
+      [&] {
+        loop.camera.sequence += 2;  // skipped for the next
+        return loop.health().has(Health::machine_slow);
+      },
+      500));
+  EXPECT_FALSE(loop.health().has(Health::frames_lost));
+  ASSERT_TRUE(loop.until([&] { return loop.health().empty(); }, 500));
+}
+
 // A daemon that cannot keep up skips frames: the cable is not the cause.
 TEST(CaptureLoop, FramesThatWereSkippedAreNotLost) {
   SteppedLoop loop;

@@ -173,6 +173,47 @@ TEST(RateWatch, BeginsAnewWithACameraOpenedAnew) {
   EXPECT_EQ(watch.rate().fps(), 0);
 }
 
+TEST(SkipWatch, NamesAMachineThatLeavesOutMoreThanAFifth) {
+  SkipWatch watch;
+  hal::FrameInfo info;
+  const auto add = [&](int frames, std::uint64_t step) {
+    for (int i = 0; i < frames; ++i) {
+      info.sequence += step;
+      info.timestamp_ns += static_cast<std::int64_t>(step) * kPeriod;
+      watch.add(info);
+    }
+  };
+  add(150, 1);
+  add(30, 2);  // 30 of 210 in two seconds
+  EXPECT_FALSE(watch.behind());
+  add(100, 3);  // two of three
+  EXPECT_TRUE(watch.behind());
+  add(400, 1);
+  EXPECT_FALSE(watch.behind());
+}
+
+TEST(SkipWatch, WhatTheCameraLostIsNotSkipped) {
+  SkipWatch watch;
+  hal::FrameInfo info;
+  info.flags = hal::kFrameAfterGap;
+  for (int i = 0; i < 100; ++i) {
+    info.sequence += 5;
+    info.timestamp_ns += 5 * kPeriod;
+    watch.add(info);
+  }
+  EXPECT_FALSE(watch.behind());
+}
+
+TEST(SkipWatch, OneFrameInSecondsIsTooSlow) {
+  SkipWatch watch;
+  hal::FrameInfo info;
+  watch.add(info);
+  info.sequence = 300;
+  info.timestamp_ns = 300 * kPeriod;
+  watch.add(info);
+  EXPECT_TRUE(watch.behind());
+}
+
 TEST(LightTimeline, ExposureBeginsAPeriodBeforeTheFramesEnd) {
   hal::FrameInfo info;
   info.timestamp_ns = 50 * kMs;

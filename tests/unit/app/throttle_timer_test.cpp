@@ -1,4 +1,4 @@
-#include "daemon/app/realtime_throttle.hpp"
+#include "daemon/app/throttle_timer.hpp"
 
 #include <gtest/gtest.h>
 #include <sys/resource.h>
@@ -19,15 +19,15 @@ long voluntary_switches() {
   return usage.ru_nvcsw;
 }
 
-TEST(RealtimeThrottle, PutsAThreadToSleepThatNeverWaits) {
+TEST(ThrottleTimer, PutsAThreadToSleepThatNeverWaits) {
   boost::asio::io_context io(1);
-  RealtimeThrottle realtime_throttle(io);
+  ThrottleTimer throttle_timer(io);
   const long before = voluntary_switches();
   const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(60);
   // Work without an end, as with more clients than can be served.
   std::function<void()> work = [&] {
     if (voluntary_switches() - before >= 2 || std::chrono::steady_clock::now() > end) {
-      realtime_throttle.stop();
+      throttle_timer.stop();
     } else {
       boost::asio::post(io, work);
     }
@@ -37,12 +37,12 @@ TEST(RealtimeThrottle, PutsAThreadToSleepThatNeverWaits) {
   EXPECT_GE(voluntary_switches() - before, 2);
 }
 
-TEST(RealtimeThrottle, LeavesNoWorkWhenItIsStoppedAsItsTimeComes) {
+TEST(ThrottleTimer, LeavesNoWorkWhenItIsStoppedAsItsTimeComes) {
   using namespace std::chrono_literals;
   boost::asio::io_context io(1);
   boost::asio::steady_timer sooner(io, 1ms);
-  RealtimeThrottle realtime_throttle(io);
-  sooner.async_wait([&](const boost::system::error_code&) { realtime_throttle.stop(); });
+  ThrottleTimer throttle_timer(io);
+  sooner.async_wait([&](const boost::system::error_code&) { throttle_timer.stop(); });
   std::this_thread::sleep_for(150ms);  // both are due
   io.run_for(10s);
   EXPECT_TRUE(io.stopped());

@@ -1,0 +1,33 @@
+#include "daemon/app/throttle_timer.hpp"
+
+#include <boost/asio/io_context.hpp>
+#include <chrono>
+
+namespace dtact::app {
+namespace {
+
+constexpr std::chrono::milliseconds kPause{1};
+
+}  // namespace
+
+ThrottleTimer::ThrottleTimer(boost::asio::io_context& io)
+    : timer_(io), throttle_(base::system_clock(), kPause) {
+  wait();
+}
+
+void ThrottleTimer::stop() {
+  // The timer may have expired already: then its handler still comes, without an error.
+  stopped_ = true;
+  timer_.cancel();
+}
+
+void ThrottleTimer::wait() {
+  timer_.expires_after(base::RealtimeThrottle::kInterval);
+  timer_.async_wait([this](const boost::system::error_code& error) {
+    if (error || stopped_) return;
+    throttle_.pause_if_busy();
+    wait();
+  });
+}
+
+}  // namespace dtact::app
