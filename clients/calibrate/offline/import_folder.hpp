@@ -29,7 +29,7 @@ struct Stated {
   std::string by;  ///< "usual", "--pitch-mm", "FILE:12"
 };
 
-/// What such a calibration was made with.
+/// What the calibration to import was made with.
 struct ImportSettings {
   Stated rows{7, "usual"};
   Stated cols{9, "usual"};
