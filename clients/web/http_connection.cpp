@@ -1,11 +1,13 @@
 #include "clients/web/http_connection.hpp"
 
+#include <algorithm>
 #include <boost/asio/ssl/stream.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <boost/beast/core/flat_buffer.hpp>
 #include <boost/beast/http.hpp>
 #include <boost/beast/http/span_body.hpp>
 #include <boost/beast/websocket.hpp>
+#include <map>
 #include <optional>
 #include <type_traits>
 #include <utility>
@@ -38,8 +40,9 @@ template <typename Stream>
 class HttpConnection : public std::enable_shared_from_this<HttpConnection<Stream>> {
  public:
   template <typename... Arguments>
-  HttpConnection(net::Peer peer, std::weak_ptr<Site> site, std::shared_ptr<void> ticket,
-                 std::chrono::milliseconds peer_timeout, Arguments&&... arguments)
+  HttpConnection(net::Peer peer, std::weak_ptr<Site> site,
+                 std::shared_ptr<HttpLimits::Ticket> ticket, std::chrono::milliseconds peer_timeout,
+                 Arguments&&... arguments)
       : stream_(std::make_unique<Stream>(std::forward<Arguments>(arguments)...)),
         timer_(stream_->get_executor()),
         peer_(std::move(peer)),
@@ -48,6 +51,9 @@ class HttpConnection : public std::enable_shared_from_this<HttpConnection<Stream
         peer_timeout_(peer_timeout) {}
 
   void start() {
+    ticket_->close = [weak = this->weak_from_this()] {
+      if (const auto self = weak.lock()) self->hang_up();
+    };
     if constexpr (kTls) {
       wait_at_most(kTimeout);
       stream_->async_handshake(asio::ssl::stream_base::server,
@@ -69,10 +75,14 @@ class HttpConnection : public std::enable_shared_from_this<HttpConnection<Stream
     timer_.expires_after(time);
     timer_.async_wait([weak = this->weak_from_this()](const error_code& error) {
       const auto self = weak.lock();
-      if (error || self == nullptr) return;
-      if (self->stream_) self->hang_up(*self->stream_);
-      if (self->channel_) self->hang_up(*self->channel_);
+      if (!error && self != nullptr) self->hang_up();
     });
+  }
+
+  void hang_up() {
+    timer_.cancel();
+    if (stream_) hang_up(*stream_);
+    if (channel_) hang_up(*channel_);
   }
 
   template <typename Layer>
@@ -104,7 +114,9 @@ class HttpConnection : public std::enable_shared_from_this<HttpConnection<Stream
     const Request& request = parser.get();
     const auto site = site_.lock();
     if (site == nullptr) return;
-    if (beast::websocket::is_upgrade(request)) return upgrade(request, site->upgrade(request));
+    if (beast::websocket::is_upgrade(request)) {
+      return upgrade(request, site->upgrade(request, peer_));
+    }
     const bool body = parser.chunked() || parser.content_length().value_or(0) > 0;
     if (body)
       return answer(request, refusal(http::status::payload_too_large, "send no body"), true);
@@ -117,6 +129,14 @@ class HttpConnection : public std::enable_shared_from_this<HttpConnection<Stream
   }
 
   void answer(const Request& request, Answer made, bool last) {
+    if (made.delay > std::chrono::milliseconds(0)) {
+      timer_.expires_after(std::exchange(made.delay, std::chrono::milliseconds(0)));
+      timer_.async_wait([self = this->shared_from_this(), &request, made = std::move(made),
+                         last](const error_code& error) {
+        if (!error) self->answer(request, made, last);
+      });
+      return;
+    }
     answer_ = std::move(made);
     response_ = Response(answer_.status, 11);
     response_.set(http::field::content_type,
@@ -129,6 +149,9 @@ class HttpConnection : public std::enable_shared_from_this<HttpConnection<Stream
     response_.set(http::field::cache_control, answer_.tag.empty() ? "no-store" : "no-cache");
     if (answer_.status == http::status::method_not_allowed) {
       response_.set(http::field::allow, "GET, HEAD");
+    }
+    if (answer_.status == http::status::unauthorized) {
+      response_.set(http::field::www_authenticate, "Bearer");
     }
     std::string_view bytes = answer_.bytes.empty() ? std::string_view(answer_.text) : answer_.bytes;
     if (!answer_.tag.empty()) {
@@ -191,7 +214,7 @@ class HttpConnection : public std::enable_shared_from_this<HttpConnection<Stream
   asio::steady_timer timer_;
   net::Peer peer_;
   std::weak_ptr<Site> site_;
-  std::shared_ptr<void> ticket_;
+  std::shared_ptr<HttpLimits::Ticket> ticket_;
   std::chrono::milliseconds peer_timeout_;
   beast::flat_buffer buffer_{kMaxHead};
   std::optional<Parser> parser_;  ///< For the current request.
@@ -201,23 +224,33 @@ class HttpConnection : public std::enable_shared_from_this<HttpConnection<Stream
 
 }  // namespace
 
-std::shared_ptr<void> HttpLimits::admit(const std::string& host) {
-  std::size_t& of_host = counts_->hosts[host];
-  if (counts_->all >= kMax || of_host >= kMaxOfHost) {
-    if (of_host == 0) counts_->hosts.erase(host);
-    return nullptr;
+HttpLimits::Ticket::~Ticket() {
+  if (const auto open = open_.lock()) open->remove(this);
+}
+
+std::shared_ptr<HttpLimits::Ticket> HttpLimits::admit(const std::string& host) {
+  std::map<std::string, std::size_t> hosts;
+  for (const Ticket* ticket : *open_) ++hosts[ticket->host_];
+  std::string from;  // whose oldest goes; empty: nobody's
+  if (hosts[host] >= kMaxOfHost) {
+    from = host;
+  } else if (open_->size() >= kMax) {
+    from = std::ranges::max_element(hosts, {}, [](const auto& one) { return one.second; })->first;
   }
-  ++counts_->all;
-  ++of_host;
-  return {counts_.get(), [counts = counts_, host](Counts*) {
-            --counts->all;
-            const auto found = counts->hosts.find(host);
-            if (--found->second == 0) counts->hosts.erase(found);
-          }};
+  const auto oldest = std::ranges::find_if(
+      *open_, [&](const Ticket* ticket) { return !from.empty() && ticket->host_ == from; });
+  if (oldest != open_->end()) {
+    const auto close = (*oldest)->close;
+    open_->erase(oldest);
+    close();
+  }
+  const std::shared_ptr<Ticket> ticket(new Ticket(open_, host));
+  open_->push_back(ticket.get());
+  return ticket;
 }
 
 void serve_http(tcp::socket socket, net::Peer peer, asio::ssl::context* tls,
-                std::weak_ptr<Site> site, std::shared_ptr<void> ticket,
+                std::weak_ptr<Site> site, std::shared_ptr<HttpLimits::Ticket> ticket,
                 std::chrono::milliseconds peer_timeout) {
   if (tls != nullptr) {
     std::make_shared<HttpConnection<asio::ssl::stream<tcp::socket>>>(

@@ -2,6 +2,7 @@
 
 #include <boost/beast/http/empty_body.hpp>
 #include <boost/beast/http/message.hpp>
+#include <chrono>
 #include <functional>
 #include <memory>
 #include <string>
@@ -20,9 +21,10 @@ using Request = boost::beast::http::request<boost::beast::http::empty_body>;
 struct Answer {
   boost::beast::http::status status = boost::beast::http::status::ok;
   std::string_view type = "text/plain; charset=utf-8";
-  std::string text = {};        ///< The body, …
-  std::string_view bytes = {};  ///< … unless this is it, which lives as long as the program.
-  std::string tag = {};         ///< ETag; empty: browsers must not cache it.
+  std::string text = {};               ///< The body, …
+  std::string_view bytes = {};         ///< … unless this is it, which lives as long as the program.
+  std::string tag = {};                ///< ETag; empty: browsers must not cache it.
+  std::chrono::milliseconds delay{0};  ///< Is sent after this.
 };
 
 inline Answer refusal(boost::beast::http::status status, std::string sentence) {
@@ -46,7 +48,7 @@ class Site {
   virtual ~Site() = default;
 
   [[nodiscard]] virtual Answer answer(const Request& request) = 0;
-  [[nodiscard]] virtual Upgrade upgrade(const Request& request) = 0;
+  [[nodiscard]] virtual Upgrade upgrade(const Request& request, const net::Peer& peer) = 0;
 };
 
 }  // namespace dtact::web

@@ -107,6 +107,12 @@ void Sensor::introduce(v1::HelloReply& reply) const {
 
 void Sensor::on_request(const std::shared_ptr<net::Session>& session,
                         const v1::ClientMessage& message) {
+  if (!viewers_[session.get()].requests.take(1)) {
+    return session->reply_error(
+        message.id(), v1::ERROR_BUSY,
+        fmt::format("this viewer asks more than {:g} times a second: ask again later",
+                    kMaxRequestsPerS));
+  }
   if (message.has_subscribe()) return subscribe(session, message.id(), message.subscribe());
   source_->request(message, [weak = std::weak_ptr(session), id = message.id()](v1::Reply reply) {
     if (const auto viewer = weak.lock()) send(*viewer, id, std::move(reply));
@@ -122,7 +128,11 @@ void Sensor::subscribe(const std::shared_ptr<net::Session>& session, std::uint64
     send(*viewer, id, std::move(reply));
   };
   source_->subscribe(
-      session.get(), request, answered,
+      {.who = session.get(),
+       .owner =
+           session->token_name().empty() ? session->peer().host : "token " + session->token_name(),
+       .may_control = session->rights() == net::Rights::control},
+      request, answered,
       [this, session = session.get()](const RelayedFrame& frame, std::uint64_t missed) {
         on_frame(*session, frame, missed);
       });

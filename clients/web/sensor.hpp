@@ -12,6 +12,7 @@
 #include "daemon/serve/net_config.hpp"
 #include "daemon/serve/session.hpp"
 #include "daemon/serve/session_list.hpp"
+#include "daemon/serve/token_bucket.hpp"
 
 namespace dtact::web {
 
@@ -39,9 +40,13 @@ class Sensor : public net::SessionHost, public std::enable_shared_from_this<Sens
   void on_closed(const net::Session& session) override;
 
  private:
+  /// Requests a second of one viewer, and as many at once after a rest.
+  static constexpr double kMaxRequestsPerS = 100;
+
   struct Viewer {
     WireTransport* transport = nullptr;  ///< The session's.
     std::uint32_t waiting = 0;           ///< RelayedFrame::parts of the frame that waits.
+    net::TokenBucket requests{kMaxRequestsPerS, kMaxRequestsPerS};
   };
 
   void on_changed();

@@ -38,6 +38,17 @@ Answer misdirected(const Request& request) {
                   field(request, http::field::host), field(request, http::field::host)));
 }
 
+Answer refusal_of(const net::Admission::Verdict& verdict) {
+  if (verdict.error_code != v1::ERROR_DENIED) {
+    return refusal(http::status::service_unavailable, verdict.sentence);
+  }
+  Answer answer =
+      refusal(http::status::unauthorized,
+              verdict.sentence + ": it belongs into the connection's address, ?token=…");
+  answer.delay = verdict.delay;
+  return answer;
+}
+
 }  // namespace
 
 Server::Server(asio::io_context& io, Settings settings, const Page& page)
@@ -58,12 +69,9 @@ Server::Server(asio::io_context& io, Settings settings, const Page& page)
   guided_ = std::make_unique<guided::GuidedEndpoint>(
       std::move(calibrated), std::move(settings.work_folder), config_, admission_);
   listener_ = net::listen_tcp(io, config_, [this](asio::ip::tcp::socket socket, net::Peer peer) {
-    // A connection beyond the limit is closed without an HTTP reply, which would cost the resources
-    // that are short.
-    if (auto ticket = limits_.admit(peer.host)) {
-      serve_http(std::move(socket), std::move(peer), tls_ ? &tls_->context : nullptr,
-                 weak_from_this(), std::move(ticket), config_.peer_timeout);
-    }
+    auto ticket = limits_.admit(peer.host);
+    serve_http(std::move(socket), std::move(peer), tls_ ? &tls_->context : nullptr,
+               weak_from_this(), std::move(ticket), config_.peer_timeout);
   });
 }
 
@@ -109,7 +117,7 @@ Answer Server::answer(const Request& request) {
   return refusal(http::status::not_found, "there is nothing here");
 }
 
-Upgrade Server::upgrade(const Request& request) {
+Upgrade Server::upgrade(const Request& request, const net::Peer& peer) {
   if (!is_for_us(request)) return {.refusal = misdirected(request)};
   const std::string_view origin = field(request, http::field::origin);
   const std::string_view host = field(request, http::field::host);
@@ -120,10 +128,14 @@ Upgrade Server::upgrade(const Request& request) {
     return {.refusal = refusal(http::status::forbidden,
                                fmt::format("a page of {} may not look at this sensor", origin))};
   }
-  if (foxglove) return foxglove_->upgrade(request);
-  if (guided_->knows(path_of(request))) {
+  const bool guided = guided_->knows(path_of(request));
+  if (foxglove || guided) {
+    // Before there is a WebSocket: a refused one would hold a descriptor until it has read why.
     const std::string target(request.target().data(), request.target().size());
-    return guided_->upgrade(path_of(request), token_of(target));
+    const std::string token = token_of(target);
+    const auto verdict = admission_.judge(peer, token);
+    if (!verdict.rights) return {.refusal = refusal_of(verdict)};
+    return foxglove ? foxglove_->upgrade(request) : guided_->upgrade(path_of(request), token);
   }
   const auto sensor = find(path_of(request));
   if (sensor == nullptr) {
@@ -131,8 +143,8 @@ Upgrade Server::upgrade(const Request& request) {
                                "there is no such sensor: GET /sensors lists those there are")};
   }
   return {.max_message = wire::kMaxMessage + wire::kLengthSize,
-          .open = [sensor](std::shared_ptr<WebSocket> socket, net::Peer peer) {
-            sensor->admit(std::move(socket), std::move(peer));
+          .open = [sensor](std::shared_ptr<WebSocket> socket, net::Peer from) {
+            sensor->admit(std::move(socket), std::move(from));
           }};
 }
 

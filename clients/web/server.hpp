@@ -54,7 +54,7 @@ class Server : public Site, public std::enable_shared_from_this<Server> {
   [[nodiscard]] std::uint16_t port() const { return listener_->port(); }
 
   [[nodiscard]] Answer answer(const Request& request) override;
-  [[nodiscard]] Upgrade upgrade(const Request& request) override;
+  [[nodiscard]] Upgrade upgrade(const Request& request, const net::Peer& peer) override;
 
  private:
   [[nodiscard]] bool is_for_us(const Request& request) const;

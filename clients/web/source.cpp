@@ -20,6 +20,20 @@ bool wants_frames(const v1::Subscribe& request) {
          request.summary() || request.cloud() != v1::CLOUD_NONE || request.pose();
 }
 
+/// Requests that change nothing.
+bool only_reads(v1::ClientMessage::RequestCase request) {
+  switch (request) {
+    case v1::ClientMessage::kGetStatus:
+    case v1::ClientMessage::kGetCalibration:
+    case v1::ClientMessage::kListCalibrations:
+    case v1::ClientMessage::kGetReference:
+    case v1::ClientMessage::kPing:
+      return true;
+    default:
+      return false;
+  }
+}
+
 v1::Reply done() {
   v1::Reply reply;
   reply.mutable_done();
@@ -117,7 +131,8 @@ void Source::on_message(const v1::ServerMessage& message) {
 void Source::request(v1::ClientMessage message, Answered answered) {
   if (!connected_) return answered(away());
   const std::size_t cost = 1 + message.ByteSizeLong() / kCounted;
-  if (!requests_.take(static_cast<double>(cost))) {
+  const double reserve = only_reads(message.request_case()) ? kReservedRequests : 0;
+  if (!requests_.take(static_cast<double>(cost), reserve)) {
     return answered(
         error_reply(v1::ERROR_BUSY,
                     "the viewers of this gateway together ask more than the daemon answers: "
@@ -128,7 +143,31 @@ void Source::request(v1::ClientMessage message, Answered answered) {
   link_->send(message.SerializeAsString());
 }
 
-void Source::subscribe(const void* who, v1::Subscribe request, Answered answered, OnFrame frame) {
+std::string Source::no_room_for(const Subscriber& subscriber) const {
+  // The stream that it leaves for the new one does not count.
+  const auto stays = [&](const Stream& stream) {
+    return std::ranges::any_of(stream.members,
+                               [&](const Member& member) { return member.who != subscriber.who; });
+  };
+  const auto all = static_cast<std::size_t>(std::ranges::count_if(streams_, stays));
+  const auto own = static_cast<std::size_t>(std::ranges::count_if(
+      streams_, [&](const auto& one) { return stays(one) && one.owner == subscriber.owner; }));
+  if (own >= kMaxFeedsOfOne) {
+    return fmt::format(
+        "{} has {} different subscriptions to {} and no more are made: subscribe to what another "
+        "viewer does, or end one",
+        subscriber.owner, own, name_);
+  }
+  if (all < kMaxFeeds - (subscriber.may_control ? 0 : kReservedFeeds)) return {};
+  return fmt::format(
+      "the viewers of this gateway have {} different subscriptions to {} and no more are made: "
+      "subscribe to what another one does, or end one",
+      all, name_);
+}
+
+void Source::subscribe(const Subscriber& subscriber, v1::Subscribe request, Answered answered,
+                       OnFrame frame) {
+  const void* const who = subscriber.who;
   if (!connected_) return answered(away());
   const std::uint64_t serial = next_serial_++;
   newest_[who] = serial;
@@ -145,15 +184,11 @@ void Source::subscribe(const void* who, v1::Subscribe request, Answered answered
   const std::string key = request.SerializeAsString();
   auto stream = std::ranges::find(streams_, key, &Stream::key);
   if (stream == streams_.end()) {
-    if (streams_.size() >= kMaxFeeds) {
-      return answered(error_reply(
-          v1::ERROR_BUSY,
-          fmt::format("the viewers of this gateway have {} different subscriptions to {} and no "
-                      "more are made: subscribe to what another one does, or end one",
-                      kMaxFeeds, name_)));
+    if (std::string sentence = no_room_for(subscriber); !sentence.empty()) {
+      return answered(error_reply(v1::ERROR_BUSY, std::move(sentence)));
     }
     const std::uint64_t number = next_serial_++;
-    streams_.push_back({number, key, open(number, request), false, {}});
+    streams_.push_back({number, key, subscriber.owner, open(number, request), false, {}});
     stream = std::prev(streams_.end());
   }
   stream->members.push_back({who, serial, std::move(answered), std::move(frame)});

@@ -21,12 +21,18 @@ namespace dtact::web {
 /// by all who ask for the same. On the thread that runs `io`.
 class Source : public std::enable_shared_from_this<Source> {
  public:
-  /// Different streams of one daemon at one time; each is a client of it.
+  /// Different streams of one daemon at one time; each is a client of it. …
   static constexpr std::size_t kMaxFeeds = 8;
+  /// … of which those that may only view leave these to others, …
+  static constexpr std::size_t kReservedFeeds = 2;
+  /// … and one address or token has at most these.
+  static constexpr std::size_t kMaxFeedsOfOne = 5;
   /// Requests a second of all viewers together, and as many at once after a rest: fewer than what
   /// the daemon ends a connection for (500), so that one viewer does not cost all of them the
   /// daemon.
   static constexpr double kMaxRequestsPerS = 400;
+  /// Of them those that requests which only read leave to commands.
+  static constexpr double kReservedRequests = 100;
 
   using Answered = std::function<void(v1::Reply)>;
   using OnFrame = std::function<void(const RelayedFrame&, std::uint64_t missed)>;
@@ -56,10 +62,17 @@ class Source : public std::enable_shared_from_this<Source> {
   /// Passes a request on under an id of its own; `answered` is called once, also with an error when
   /// the daemon goes away first.
   void request(v1::ClientMessage message, Answered answered);
-  /// Puts `who` on the stream of `request` in place of the one it was on, once the daemon agrees;
-  /// `answered` is called once, and then `frame` for each frame, `missed` ones having been lost
-  /// before it. A request for nothing ends the stream.
-  void subscribe(const void* who, v1::Subscribe request, Answered answered, OnFrame frame);
+  /// One who subscribes.
+  struct Subscriber {
+    const void* who = nullptr;
+    std::string owner;  ///< Its address or token, for kMaxFeedsOfOne.
+    bool may_control = false;
+  };
+  /// Puts `subscriber` on the stream of `request` in place of the one it was on, once the daemon
+  /// agrees; `answered` is called once, and then `frame` for each frame, `missed` ones having been
+  /// lost before it. A request for nothing ends the stream.
+  void subscribe(const Subscriber& subscriber, v1::Subscribe request, Answered answered,
+                 OnFrame frame);
   /// Ends the stream of `who`, who is not called any more.
   void leave(const void* who);
 
@@ -72,7 +85,8 @@ class Source : public std::enable_shared_from_this<Source> {
   };
   struct Stream {
     std::uint64_t number = 0;
-    std::string key;  ///< The Subscribe, serialized.
+    std::string key;    ///< The Subscribe, serialized.
+    std::string owner;  ///< Who had it opened: Subscriber::owner.
     std::shared_ptr<Feed> feed;
     bool agreed = false;
     std::vector<Member> members;
@@ -86,6 +100,8 @@ class Source : public std::enable_shared_from_this<Source> {
   [[nodiscard]] std::shared_ptr<Feed> open(std::uint64_t stream, const v1::Subscribe& request);
   [[nodiscard]] Stream* find(std::uint64_t stream);
   [[nodiscard]] v1::Reply away() const;
+  /// Why no stream is opened for it; empty: there is room.
+  [[nodiscard]] std::string no_room_for(const Subscriber& subscriber) const;
   /// Answers the clients that wait for a stream; once it flows, ends their other streams.
   void settle(Stream& stream, const v1::Reply& reply);
   void retire_empty();

@@ -23,7 +23,7 @@ namespace http = beast::http;
 using boost::system::error_code;
 using tcp = asio::ip::tcp;
 
-/// Scrapers connect one after another; more connections are closed at once.
+/// Scrapers connect one after another; one connection more takes the place of the oldest.
 constexpr std::size_t kMaxConnections = 8;
 constexpr std::size_t kMaxHeader = 8192;  // bytes
 constexpr std::chrono::seconds kTimeout{5};
@@ -123,7 +123,10 @@ struct Endpoint::Impl : std::enable_shared_from_this<Impl> {
 
   void take(tcp::socket socket) {
     open.remove_if([](const auto& exchange) { return exchange.expired(); });
-    if (open.size() >= kMaxConnections) return;
+    if (open.size() >= kMaxConnections) {
+      if (const auto oldest = open.front().lock()) oldest->close();
+      open.pop_front();
+    }
     const auto exchange = std::make_shared<Exchange>(std::move(socket), text);
     open.push_back(exchange);
     exchange->start();

@@ -45,7 +45,7 @@ void SensorTopics::update() {
   if (request.SerializeAsString() == asked_) return;
   asked_ = request.SerializeAsString();
   source_->subscribe(
-      this, request,
+      {.who = this, .owner = "Foxglove", .may_control = true}, request,
       [this](const v1::Reply& reply) {
         if (!reply.has_error()) return;
         asked_.clear();
