@@ -31,6 +31,9 @@ inline constexpr std::size_t kMaxProgramName = 64;
 /// Longest token in Hello, bytes.
 inline constexpr std::size_t kMaxToken = 256;
 
+/// Bytes of ClientMessage.on_behalf_of that are logged.
+inline constexpr std::size_t kMaxOnBehalfOf = 256;
+
 /// Longest calibration name in UploadCalibration, bytes.
 inline constexpr std::size_t kMaxCalibrationName = 64;
 

@@ -10,6 +10,7 @@
 #include "clients/calibrate/guided/session.hpp"
 #include "clients/common/exit_codes.hpp"
 #include "clients/common/interruptible.hpp"
+#include "clients/common/program.hpp"
 
 namespace dtact::ctl {
 namespace {
@@ -47,7 +48,7 @@ void add_guided(CLI::App& app, cli::Context& context) {
   plan->folder = "dtact-calibration";
   guided->add_option("--radius-mm", plan->ball_radius_mm, "Radius of the ball, mm")
       ->required()
-      ->check(CLI::Range(0.1, 100.0));
+      ->check(cli::in_range(0.1, 100.0));
   add_map_options(*guided, plan->map);
   guided
       ->add_option("--presses", plan->presses,
@@ -63,7 +64,7 @@ void add_guided(CLI::App& app, cli::Context& context) {
   guided
       ->add_option("--patience", plan->timeout_s, "Seconds to wait for a surface that holds still")
       ->capture_default_str()
-      ->check(CLI::PositiveNumber);
+      ->check(cli::positive());
   const auto method = std::make_shared<std::string>("auto");
   guided->add_option("--method", *method, "How the LUT is made, as of dtact-calibrate depth")
       ->check(CLI::IsMember({"auto", "list", "model"}))

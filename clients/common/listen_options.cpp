@@ -1,6 +1,9 @@
 #include "clients/common/listen_options.hpp"
 
+#include <fmt/format.h>
+
 #include <CLI/CLI.hpp>
+#include <exception>
 
 namespace dtact::cli {
 
@@ -27,6 +30,20 @@ void add_listen_options(CLI::App& command, net::NetConfig& settings) {
       "--listen-insecure", settings.insecure,
       "Listen beyond this machine without TLS or tokens: every host that reaches it may "
       "watch and command");
+}
+
+void reload_at_hangup(boost::asio::signal_set& hangups, const net::Log& log,
+                      const std::function<void()>& reload) {
+  hangups.async_wait([&hangups, &log, reload](const boost::system::error_code& error, int) {
+    if (error) return;
+    try {
+      reload();
+      log({net::LogLevel::info, "certificate, key and tokens read again"});
+    } catch (const std::exception& e) {
+      log({net::LogLevel::warning, fmt::format("everything stays as it was: {}", e.what())});
+    }
+    reload_at_hangup(hangups, log, reload);
+  });
 }
 
 }  // namespace dtact::cli

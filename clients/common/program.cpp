@@ -1,5 +1,7 @@
 #include "clients/common/program.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cctype>
 #include <ostream>
@@ -66,7 +68,23 @@ std::string options_of(const CLI::App& app) {
   return text;
 }
 
+CLI::Validator number_check(double least, double most, const std::string& described) {
+  return {[least, most](std::string& text) {
+            double value = 0;
+            const bool is_number = CLI::detail::lexical_cast(text, value);
+            if (is_number && value >= least && value <= most) return std::string();
+            return fmt::format("{} is no number from {} to {}", text, least, most);
+          },
+          described};
+}
+
 }  // namespace
+
+CLI::Validator in_range(double least, double most) {
+  return number_check(least, most, fmt::format("FLOAT in [{} - {}]", least, most));
+}
+
+CLI::Validator positive() { return number_check(1e-9, 1e9, "POSITIVE"); }
 
 std::string command_line(const CLI::App& command) {
   std::string text = " " + command.get_name() + options_of(command);

@@ -21,6 +21,11 @@ struct Context {
 /// the program's name and version.
 void add_global_options(CLI::App& app, Context& context);
 
+/// As CLI::Range and CLI::PositiveNumber, which let NaN pass: refuses all that is no number in the
+/// range, and for positive() what is above 1e9.
+[[nodiscard]] CLI::Validator in_range(double least, double most);
+[[nodiscard]] CLI::Validator positive();
+
 /// --json, of a command that prints what it was asked for.
 CLI::Option* add_json_option(CLI::App& command, Context& context);
 

@@ -105,16 +105,23 @@ std::vector<v1::StoredCalibration> Client::calibrations() {
   return {calibrations.begin(), calibrations.end()};
 }
 
-std::uint64_t Client::upload_calibration(const v1::UploadCalibration& files) {
+v1::Done Client::upload_calibration(const v1::UploadCalibration& files) {
   v1::ClientMessage message;
   *message.mutable_upload_calibration() = files;
-  return session_->request(message, parse_timeout(session_->options())).done().calibration();
+  return session_->request(message, parse_timeout(session_->options())).done();
 }
 
 void Client::activate_calibration(std::uint64_t number) {
   v1::ClientMessage message;
   message.mutable_activate_calibration()->set_number(number);
   (void)session_->request(message, parse_timeout(session_->options()));
+}
+
+void Client::pin_calibration(std::uint64_t number, bool pinned) {
+  v1::ClientMessage message;
+  message.mutable_pin_calibration()->set_number(number);
+  message.mutable_pin_calibration()->set_pinned(pinned);
+  (void)session_->request(message, session_->options().timeout);
 }
 
 std::optional<Item> Client::next(std::chrono::milliseconds timeout) {

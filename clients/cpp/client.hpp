@@ -94,10 +94,13 @@ class DTACT_EXPORT Client {
   /// All calibrations of the daemon: the configured one, then the uploaded ones, oldest first. May
   /// take a few seconds, because the daemon reads and checks those that it does not know yet.
   [[nodiscard]] std::vector<v1::StoredCalibration> calibrations();
-  /// Returns once the daemon uses and has stored it, with its number. May take a few seconds.
-  std::uint64_t upload_calibration(const v1::UploadCalibration& files);
+  /// Returns once the daemon uses and has stored it, with its number and those that the daemon has
+  /// removed. May take a few seconds.
+  v1::Done upload_calibration(const v1::UploadCalibration& files);
   /// Makes one of calibrations() current. Returns once the daemon uses it, also after a restart.
   void activate_calibration(std::uint64_t number);
+  /// A pinned calibration is not removed, whatever is uploaded later.
+  void pin_calibration(std::uint64_t number, bool pinned = true);
 
   /// The next frame, event or reconnection; nothing when none came in time. Throws ConnectionError
   /// when the connection is lost, without Options::reconnect. With it, next() reconnects; the last

@@ -155,7 +155,7 @@ void add_bench(CLI::App& app, Context& context) {
       "and lost by the camera");
   const auto options = std::make_shared<BenchOptions>();
   command->add_option("--seconds", options->seconds, "For so long each")
-      ->check(CLI::PositiveNumber)
+      ->check(cli::positive())
       ->capture_default_str();
   command->add_flag("--encodings", options->encodings,
                     "Every encoding of depth one after another, not the plain one alone");

@@ -42,11 +42,14 @@ Id number_of(const v1::CalibrationFiles& files) {
 }
 
 void print_json(const Context& context, const std::string& name, const Id& number,
-                const std::string& folder = {}) {
+                const std::string& folder = {}, const v1::Done* done = nullptr) {
   cli::CalibrationReport report;
   if (number) report.set_number(*number);
   report.set_name(name);
   report.set_folder(folder);
+  if (done != nullptr) {
+    for (const v1::StoredCalibration& old : done->removed()) report.add_removed(old.number());
+  }
   context.out << cli::json_line(report);
 }
 
@@ -55,10 +58,15 @@ void upload(const Context& context, const fs::path& folder, const std::string& n
   files.set_name(name.empty() ? name_of(folder) : name);
   files.set_calibration_toml(base::read_file(folder / kToml));
   files.set_reference_png(base::read_file(folder / kPng));
-  const Id number = client::Client(context.target).upload_calibration(files);
-  if (context.json) return print_json(context, files.name(), number);
+  const v1::Done done = client::Client(context.target).upload_calibration(files);
+  const Id number = done.has_calibration() ? Id(done.calibration()) : Id();
+  if (context.json) return print_json(context, files.name(), number, {}, &done);
   context.out << fmt::format("the daemon uses calibration {} from now on\n",
                              title_of(files.name(), number));
+  for (const v1::StoredCalibration& old : done.removed()) {
+    context.out << fmt::format("it removed {}: the ten used last stay, and pinned ones\n",
+                               title_of(old.name(), old.number()));
+  }
 }
 
 /// What the table does not say when the calibration in use and the one to start with differ.
@@ -105,6 +113,14 @@ void activate(const Context& context, const std::string& id) {
   client::Client(context.target).activate_calibration(number);
   if (context.json) return print_json(context, {}, number);
   context.out << fmt::format("the daemon uses calibration {} from now on\n", id);
+}
+
+void pin(const Context& context, const std::string& id, bool pinned) {
+  const std::uint64_t number = parse_id(id);
+  client::Client(context.target).pin_calibration(number, pinned);
+  if (context.json) return print_json(context, {}, number);
+  context.out << fmt::format("calibration {} {}\n", id,
+                             pinned ? "stays until it is unpinned" : "is pinned no more");
 }
 
 void save(const Context& context, const Id& id, const fs::path& folder, bool force) {
@@ -172,6 +188,14 @@ void add_calibration(CLI::App& app, Context& context) {
       "configuration's");
   add_id(use, "As in the list")->required();
   use->callback([&context, options] { activate(context, options->id); });
+
+  auto* keep = command->add_subcommand("pin", "Keep one, whatever is uploaded later");
+  add_id(keep, "As in the list")->required();
+  keep->callback([&context, options] { pin(context, options->id, true); });
+  auto* unpin =
+      command->add_subcommand("unpin", "Let it be removed again, once ten others were used");
+  add_id(unpin, "As in the list")->required();
+  unpin->callback([&context, options] { pin(context, options->id, false); });
 
   auto* fetch = command->add_subcommand("download", "Save one as a calibration folder");
   add_id(fetch, which);

@@ -70,10 +70,11 @@ std::string text_of(const std::vector<v1::StoredCalibration>& calibrations) {
                    name_width);
     if (stored.has_summary()) {
       const auto& summary = stored.summary();
-      fmt::format_to(out, "{:>9}  {:>9}  {:>7.4f}  {:<9}  {:.2f} to {:.2f} mm\n",
+      fmt::format_to(out, "{:>9}  {:>9}  {:>7.4f}  {:<9}  {:.2f} to {:.2f} mm{}\n",
                      size_text(summary.frame_width(), summary.frame_height()),
                      size_text(summary.width(), summary.height()), summary.mm_per_px(),
-                     summary.method(), summary.covered_from_mm(), summary.covered_to_mm());
+                     summary.method(), summary.covered_from_mm(), summary.covered_to_mm(),
+                     stored.pinned() ? ", pinned" : "");
     } else {
       fmt::format_to(out, "cannot be read: {}\n", stored.damage());
     }

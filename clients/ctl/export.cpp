@@ -137,6 +137,14 @@ std::string line_of(const v1::Frame& frame, std::uint64_t index, std::uint64_t t
                      fmt::join(client::names_of(frame.health()), " "), map);
 }
 
+/// A text as one field (RFC 4180): a recording may hold any.
+std::string csv_field(const std::string& text) {
+  if (text.find_first_of(",\"\r\n") == std::string::npos) return text;
+  std::string field = "\"";
+  for (const char c : text) field += c == '"' ? std::string("\"\"") : std::string(1, c);
+  return field + '"';
+}
+
 constexpr const char* kEventColumns = "time_ns,sequence,monotonic_ns,event,detail\n";
 
 std::string line_of(const v1::Event& event, std::uint64_t time) {
@@ -173,7 +181,7 @@ std::string line_of(const v1::Event& event, std::uint64_t time) {
       break;
   }
   return fmt::format("{},{},{},{},{}\n", time, event.sequence(), event.monotonic_ns(), what,
-                     detail);
+                     csv_field(detail));
 }
 
 /// Writes the frames of a recording into a folder.

@@ -46,7 +46,7 @@ void add_find(CLI::App& app, Context& context) {
       "find", "List the daemons that announce themselves in this network, through avahi-daemon");
   const auto seconds = std::make_shared<double>(3);
   command->add_option("--seconds", *seconds, "Look at most so long")
-      ->check(CLI::PositiveNumber)
+      ->check(cli::positive())
       ->capture_default_str();
   cli::add_json_option(*command, context);
   command->callback([&context, seconds] { find(context, *seconds); });

@@ -50,7 +50,7 @@ void add_reconstruction(CLI::App& app, Context& context) {
   command
       ->add_option("--max-error-um", options->max_error_um,
                    "What auto keeps to: expected error inside the contact, micrometres")
-      ->check(CLI::Range(1.0, 10000.0));
+      ->check(cli::in_range(1.0, 10000.0));
   cli::add_json_option(*command, context);
   command->callback([&context, options] {
     const v1::Reconstruction how = run(context, *options);

@@ -215,13 +215,12 @@ void add_record(CLI::App& app, Context& context) {
   command->add_option("-o,--output", options->output, "The file, press.mcap")
       ->type_name("FILE")
       ->required();
-  command->add_option("--seconds", options->seconds, "End after so long")
-      ->check(CLI::PositiveNumber);
+  command->add_option("--seconds", options->seconds, "End after so long")->check(cli::positive());
   command
       ->add_option("--pictures-hz", options->pictures_hz,
                    "Depth pictures for eyes a second, beside the lossless frames; 0: none")
       ->capture_default_str()
-      ->check(CLI::Range(0.0, 1000.0));
+      ->check(cli::in_range(0.0, 1000.0));
   command->add_flag("--no-jpeg", options->no_jpeg,
                     "Without the camera's JPEGs: depth cannot be made anew then");
   command->add_flag("--force", options->force, "Replace the file if it exists");

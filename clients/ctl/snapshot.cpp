@@ -100,7 +100,7 @@ void add_snapshot(CLI::App& app, Context& context) {
   command->add_flag("--luma", options->luma, "The camera's grey image instead of the depth");
   command->add_option("--timeout", options->timeout_s, "Seconds to wait for a frame")
       ->capture_default_str()
-      ->check(CLI::PositiveNumber);
+      ->check(cli::positive());
   cli::add_json_option(*command, context);
   command->callback([&context, options] { run_snapshot(context, *options); });
 }

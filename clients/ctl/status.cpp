@@ -65,6 +65,12 @@ void print_endpoint(const v1::Endpoint& endpoint, std::ostream& out) {
   if (!endpoint.fingerprint().empty()) {
     fmt::print(out, "             fingerprint {}\n", endpoint.fingerprint());
   }
+  if (endpoint.has_certificate_days()) {
+    const int days = endpoint.certificate_days();
+    fmt::print(out, "             certificate {}\n",
+               days < 0 ? fmt::format("EXPIRED {} days ago: dtactctl cert makes a pair", -days)
+                        : fmt::format("expires in {} days", days));
+  }
 }
 
 void print(const v1::Status& status, std::ostream& out) {
@@ -102,7 +108,10 @@ void print(const v1::Status& status, std::ostream& out) {
   for (const auto& endpoint : status.endpoints()) print_endpoint(endpoint, out);
   for (const auto& c : status.clients()) {
     fmt::print(out, "client       {} {}, sent {}, dropped {}{}\n", c.address(), c.program(),
-               c.sent(), c.dropped(), c.rights() == v1::RIGHTS_VIEW ? ", may view only" : "");
+               c.sent(), c.dropped(),
+               c.rights() == v1::RIGHTS_VIEW      ? ", may view only"
+               : c.rights() == v1::RIGHTS_CONTROL ? ", may not calibrate"
+                                                  : "");
   }
   fmt::print(out, "version      {}, up {:.0f} s\n", status.version(), status.uptime_s());
 }

@@ -36,7 +36,7 @@ void add_token(CLI::App& app, Context& context) {
   const auto arguments = std::make_shared<Arguments>();
   command->add_option("--new", arguments->rights, "What its holder may do")
       ->required()
-      ->check(CLI::IsMember({"view", "control"}));
+      ->check(CLI::IsMember({"view", "control", "calibrate"}));
   command->add_option("--name", arguments->name, "What the daemon's log calls it, without blanks")
       ->check(CLI::Validator(
           [](const std::string& name) {

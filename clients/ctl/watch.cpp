@@ -221,12 +221,12 @@ void add_watch(CLI::App& app, Context& context) {
       "health until Ctrl-C, then a summary");
   const auto options = std::make_shared<WatchOptions>();
   command->add_option("--seconds", options->seconds, "End by itself after so long")
-      ->check(CLI::PositiveNumber);
+      ->check(cli::positive());
   auto* min_fps =
       command
           ->add_option("--min-fps", options->min_fps,
                        "Exit with 4 when depth came slower, counted from the first depth frame on")
-          ->check(CLI::NonNegativeNumber);
+          ->check(cli::in_range(0.0, 1000.0));
   auto* summary = command->add_flag("--summary", options->summary,
                                     "Fetch contact and health only, without the depth maps");
   auto* json = cli::add_json_option(*command, context);

@@ -52,8 +52,12 @@ void serve(const cli::Context& context, const Settings& settings) {
     config.log({net::LogLevel::info, "listening on " + address});
   }
   boost::asio::signal_set signals(io, SIGINT, SIGTERM);
+  boost::asio::signal_set hangups(io, SIGHUP);
+  cli::reload_at_hangup(hangups, config.log, [&] { server->reload(); });
   signals.async_wait([&](const auto& error, int) {
-    if (!error) server->stop();
+    if (error) return;
+    hangups.cancel();
+    server->stop();
   });
   server->start();
   io.run();
@@ -61,7 +65,9 @@ void serve(const cli::Context& context, const Settings& settings) {
 
 void add_serve(CLI::App& app, cli::Context& context) {
   auto* command = app.add_subcommand(
-      "serve", "Serve point clouds and poses of the daemon's frames, until Ctrl-C or SIGTERM");
+      "serve",
+      "Serve point clouds and poses of the daemon's frames, until Ctrl-C or SIGTERM; SIGHUP reads "
+      "certificate, key and tokens again");
   const auto settings = std::make_shared<Settings>();
   settings->net.port = wire::kPerceivePort;
   cli::add_listen_options(*command, settings->net);

@@ -43,6 +43,11 @@ void Server::stop() {
   upstream_.reset();
 }
 
+void Server::reload() {
+  listeners_.reload(net::NetConfig(listeners_.config()));
+  session_list_.end_revoked();
+}
+
 void Server::introduce(v1::HelloReply& reply) const { reply.set_serial(serial()); }
 
 std::string Server::serial() const { return upstream_ ? upstream_->serial() : ""; }

@@ -25,6 +25,8 @@ class Server : public net::SessionHost, public std::enable_shared_from_this<Serv
 
   void start();
   void stop();
+  /// Reads certificate, key and tokens again. Throws as the constructor, and changes nothing then.
+  void reload();
   [[nodiscard]] std::vector<std::string> addresses() const { return listeners_.addresses(); }
   /// The TCP port it listens on; 0 without TCP.
   [[nodiscard]] std::uint16_t port() const { return listeners_.port(); }

@@ -117,8 +117,7 @@ void add_watch(CLI::App& app, cli::Context& context) {
       "Show a running dtact-perceive's rate, points, pose and the force, a line a second, until "
       "Ctrl-C; without --port its own port, 7378");
   const auto seconds = std::make_shared<double>(0);
-  command->add_option("--seconds", *seconds, "End by itself after so long")
-      ->check(CLI::PositiveNumber);
+  command->add_option("--seconds", *seconds, "End by itself after so long")->check(cli::positive());
   cli::add_json_option(*command, context);
   command->callback([&app, &context, seconds] {
     if (app.count("--port") == 0) context.target.port = wire::kPerceivePort;

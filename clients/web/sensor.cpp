@@ -102,7 +102,7 @@ void Sensor::introduce(v1::HelloReply& reply) const {
   reply.set_name(daemon->name());
   reply.set_serial(daemon->serial());
   reply.set_rezero_timeout_s(daemon->rezero_timeout_s());
-  if (daemon->rights() == v1::RIGHTS_VIEW) reply.set_rights(v1::RIGHTS_VIEW);
+  reply.set_rights(std::min(reply.rights(), daemon->rights()));
 }
 
 void Sensor::on_request(const std::shared_ptr<net::Session>& session,
@@ -114,9 +114,10 @@ void Sensor::on_request(const std::shared_ptr<net::Session>& session,
                     kMaxRequestsPerS));
   }
   if (message.has_subscribe()) return subscribe(session, message.id(), message.subscribe());
-  source_->request(message, [weak = std::weak_ptr(session), id = message.id()](v1::Reply reply) {
-    if (const auto viewer = weak.lock()) send(*viewer, id, std::move(reply));
-  });
+  source_->request(message, session->identity(),
+                   [weak = std::weak_ptr(session), id = message.id()](v1::Reply reply) {
+                     if (const auto viewer = weak.lock()) send(*viewer, id, std::move(reply));
+                   });
 }
 
 void Sensor::subscribe(const std::shared_ptr<net::Session>& session, std::uint64_t id,
@@ -131,7 +132,7 @@ void Sensor::subscribe(const std::shared_ptr<net::Session>& session, std::uint64
       {.who = session.get(),
        .owner =
            session->token_name().empty() ? session->peer().host : "token " + session->token_name(),
-       .may_control = session->rights() == net::Rights::control},
+       .may_control = session->rights() >= net::Rights::control},
       request, answered,
       [this, session = session.get()](const RelayedFrame& frame, std::uint64_t missed) {
         on_frame(*session, frame, missed);

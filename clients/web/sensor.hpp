@@ -26,6 +26,8 @@ class Sensor : public net::SessionHost, public std::enable_shared_from_this<Sens
 
   void start();
   void stop();
+  /// Ends the viewers whose token was revoked or has other rights now.
+  void end_revoked() const { session_list_.end_revoked(); }
   /// A new viewer.
   void admit(std::shared_ptr<WebSocket> socket, net::Peer peer);
   /// The sensor's entry of /sensors, see README.md in this folder.

@@ -7,7 +7,9 @@
 
 #include "clients/web/names.hpp"
 #include "clients/web/token_query.hpp"
+#include "daemon/serve/change_log.hpp"
 #include "daemon/serve/security.hpp"
+#include "hal/base/utf8.hpp"
 #include "proto/framing.hpp"
 
 namespace dtact::web {
@@ -16,6 +18,11 @@ namespace asio = boost::asio;
 namespace http = boost::beast::http;
 
 namespace {
+
+/// Bytes of a name that an unauthenticated client chose that are logged.
+constexpr std::size_t kMaxShown = 256;
+/// The origin of programs on the desktop: Foxglove's and Lichtblick's.
+constexpr const char* kDesktop = "file://";
 
 /// A field of a request; empty where there is none.
 template <typename Field>
@@ -69,7 +76,9 @@ Server::Server(asio::io_context& io, Settings settings, const Page& page)
       foxglove_origins_(std::move(settings.foxglove_origins)),
       page_(page),
       tls_(net::make_tls(config_)),
+      certificate_watch_(io, config_, tls_),
       admission_(config_) {
+  foxglove_origins_.emplace_back(kDesktop);
   std::vector<guided::Calibrated> calibrated;
   for (NamedDaemon& daemon : settings.daemons) {
     const client::Options options = daemon.options;
@@ -94,10 +103,24 @@ void Server::start() {
   }
   foxglove_->start();
   listener_->start();
+  certificate_watch_.check();
+}
+
+void Server::reload() {
+  std::unique_ptr<net::Tls> tls = net::make_tls(config_);
+  std::optional<net::Tokens> tokens = net::read_tokens(config_);
+  // From here on nothing fails.
+  if (tls_ && tls) *tls_ = std::move(*tls);  // where it is, since connections know its place
+  certificate_watch_.check();
+  admission_.set_tokens(std::move(tokens));
+  for (const auto& sensor : sensors_) sensor->end_revoked();
+  foxglove_->end_revoked();
+  guided_->end_revoked();
 }
 
 void Server::stop() {
   listener_->stop();
+  certificate_watch_.stop();
   foxglove_->stop();
   guided_->stop();
   for (const auto& sensor : sensors_) {
@@ -137,8 +160,11 @@ Upgrade Server::upgrade(const Request& request, const net::Peer& peer) {
   const std::vector<std::string> others = foxglove ? foxglove_origins_ : std::vector<std::string>{};
   // Only browsers say one; other programs may do all that the token lets them do.
   if (!origin.empty() && !is_own_origin(origin, host, tls_ != nullptr, others)) {
-    return {.refusal = refusal(http::status::forbidden,
-                               fmt::format("a page of {} may not look at this sensor", origin))};
+    const std::string shown = net::printable(base::first_bytes(std::string(origin), kMaxShown));
+    std::string sentence = fmt::format("a page of {} may not look at this sensor", shown);
+    if (foxglove) sentence += fmt::format(": start dtact-web with --foxglove-origin {}", shown);
+    config_.log({net::LogLevel::warning, sentence, "", net::LogSubject::unauthenticated});
+    return {.refusal = refusal(http::status::forbidden, sentence)};
   }
   const bool guided = guided_->knows(path_of(request));
   if (foxglove || guided) {
@@ -146,7 +172,7 @@ Upgrade Server::upgrade(const Request& request, const net::Peer& peer) {
     const std::string target(request.target().data(), request.target().size());
     const std::string token = token_of(target);
     const auto verdict = admission_.judge(peer, token);
-    if (!verdict.rights) return {.refusal = refusal_of(verdict)};
+    if (!verdict.grant) return {.refusal = refusal_of(verdict)};
     return foxglove ? foxglove_->upgrade(request) : guided_->upgrade(path_of(request), token);
   }
   const auto sensor = find(path_of(request));

@@ -32,8 +32,9 @@ struct Settings {
   std::vector<NamedDaemon> daemons;
   /// By which browsers may name this machine, besides its addresses.
   std::vector<std::string> host_names;
-  /// Origins that may open Foxglove's WebSocket besides our own: Foxglove's site and programs.
-  std::vector<std::string> foxglove_origins{"https://app.foxglove.dev", "file://"};
+  /// Origins that may open Foxglove's WebSocket besides our own and those of programs on the
+  /// desktop.
+  std::vector<std::string> foxglove_origins;
   /// Below it guided calibrations save what they take.
   std::filesystem::path work_folder;
 };
@@ -48,6 +49,9 @@ class Server : public Site, public std::enable_shared_from_this<Server> {
 
   void start();
   void stop();
+  /// Reads certificate, key and tokens again, and ends who has a token no more. Throws as the
+  /// constructor, and changes nothing then.
+  void reload();
   /// "http://127.0.0.1:7380/"
   [[nodiscard]] std::string address() const;
   /// The TCP port it listens on.
@@ -67,6 +71,7 @@ class Server : public Site, public std::enable_shared_from_this<Server> {
   std::vector<std::string> foxglove_origins_;
   const Page& page_;
   std::unique_ptr<net::Tls> tls_;
+  net::CertificateWatch certificate_watch_;
   net::Admission admission_;
   HttpLimits limits_;
   std::vector<std::shared_ptr<Sensor>> sensors_;

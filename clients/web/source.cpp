@@ -6,6 +6,9 @@
 #include <boost/asio/post.hpp>
 #include <utility>
 
+#include "hal/base/utf8.hpp"
+#include "proto/defaults.hpp"
+
 namespace dtact::web {
 
 namespace asio = boost::asio;
@@ -128,8 +131,9 @@ void Source::on_message(const v1::ServerMessage& message) {
   answered(message.reply());
 }
 
-void Source::request(v1::ClientMessage message, Answered answered) {
+void Source::request(v1::ClientMessage message, const std::string& identity, Answered answered) {
   if (!connected_) return answered(away());
+  message.set_on_behalf_of(base::first_bytes(identity, wire::kMaxOnBehalfOf));
   const std::size_t cost = 1 + message.ByteSizeLong() / kCounted;
   const double reserve = only_reads(message.request_case()) ? kReservedRequests : 0;
   if (!requests_.take(static_cast<double>(cost), reserve)) {

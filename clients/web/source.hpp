@@ -59,9 +59,9 @@ class Source : public std::enable_shared_from_this<Source> {
   /// What the daemon said of itself last; none before it was ever there.
   [[nodiscard]] const std::optional<v1::HelloReply>& daemon() const noexcept { return daemon_; }
 
-  /// Passes a request on under an id of its own; `answered` is called once, also with an error when
-  /// the daemon goes away first.
-  void request(v1::ClientMessage message, Answered answered);
+  /// Passes a request of the client `identity` on under an id of its own; `answered` is called
+  /// once, also with an error when the daemon goes away first.
+  void request(v1::ClientMessage message, const std::string& identity, Answered answered);
   /// One who subscribes.
   struct Subscriber {
     const void* who = nullptr;

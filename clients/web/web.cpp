@@ -3,7 +3,9 @@
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/signal_set.hpp>
 #include <filesystem>
+#include <map>
 #include <memory>
+#include <optional>
 #include <ostream>
 #include <set>
 #include <stdexcept>
@@ -13,6 +15,7 @@
 #include "clients/web/names.hpp"
 #include "clients/web/page.hpp"
 #include "clients/web/server.hpp"
+#include "daemon/serve/security.hpp"
 #include "version.hpp"
 
 namespace dtact::web {
@@ -23,6 +26,7 @@ struct Arguments {
   Settings settings;
   std::vector<std::string> daemons;
   std::filesystem::path page;
+  std::optional<net::Rights> anonymous_rights;
 };
 
 std::vector<NamedDaemon> daemons_of(const Arguments& arguments, const client::Options& common) {
@@ -47,6 +51,8 @@ void serve(const cli::Context& context, const Arguments& arguments) {
   net::NetConfig& config = settings.net;
   config.program = "dtact-web " DTACT_VERSION;
   config.version = DTACT_VERSION;
+  config.anonymous_rights = arguments.anonymous_rights.value_or(
+      net::reaches_beyond(config) ? net::Rights::view : net::Rights::calibrate);
   // A line each, for a terminal and for the journal alike.
   config.log = [&out = context.out](const net::LogLine& line) {
     out << line.text << '\n' << std::flush;
@@ -63,6 +69,8 @@ void serve(const cli::Context& context, const Arguments& arguments) {
     // Connections of HTTP are not waited for.
     io.stop();
   });
+  boost::asio::signal_set hangups(io, SIGHUP);
+  cli::reload_at_hangup(hangups, config.log, [&] { server->reload(); });
   server->start();
   io.run();
 }
@@ -74,7 +82,7 @@ void set_up(CLI::App& app, cli::Context& context) {
       ->description(
           "Shows DTact tactile sensors in a browser, and steers them: a client of any number of "
           "dtactd, and a server of a page and of WebSockets that carry the daemons' own wire.\n"
-          "Serves until Ctrl-C or SIGTERM.");
+          "Serves until Ctrl-C or SIGTERM; SIGHUP reads certificate, key and tokens again.");
   cli::add_global_options(app, context);
   app.require_subcommand(0);
   const auto arguments = std::make_shared<Arguments>();
@@ -96,13 +104,22 @@ void set_up(CLI::App& app, cli::Context& context) {
     daemons->excludes(one);
   }
   cli::add_listen_options(app, net);
+  app.add_option("--anonymous-rights", arguments->anonymous_rights,
+                 "What viewers may do where there are no --tokens; by default calibrate for "
+                 "viewers on this machine, view where --listen reaches beyond it")
+      ->transform(CLI::CheckedTransformer(
+          std::map<std::string, net::Rights>{{"view", net::Rights::view},
+                                             {"control", net::Rights::control},
+                                             {"calibrate", net::Rights::calibrate}}))
+      ->type_name("view|control|calibrate");
   app.add_option("--name", arguments->settings.host_names,
                  "A name by which browsers may reach this machine, besides its own and its "
                  "addresses")
       ->type_name("HOST")
       ->take_all();
   app.add_option("--foxglove-origin", arguments->settings.foxglove_origins,
-                 "An address whose pages may open /foxglove; in place of Foxglove's own")
+                 "An address whose pages may open /foxglove, such as http://localhost:8080 or "
+                 "https://app.foxglove.dev; programs on the desktop always may")
       ->type_name("ORIGIN")
       ->take_all();
   app.add_option("--work-folder", arguments->settings.work_folder,

@@ -129,7 +129,7 @@ net::NetConfig make_net_config(const Config& config) {
   resolve_credentials(net);
   net.log = [](const net::LogLine& line) {
     log_line(line.level == net::LogLevel::info ? spdlog::level::info : spdlog::level::warn,
-             line.text, {{"DTACT_CLIENT", line.client}});
+             line.text, {{"DTACT_CLIENT", line.client}, {"DTACT_TOKEN", line.token}});
   };
   return net;
 }

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <chrono>
+#include <cmath>
 #include <cstdint>
 #include <filesystem>
 #include <map>
@@ -63,9 +64,11 @@ template <typename Number>
               controls.erase(name);
               return true;
             }
-            const bool fits = std::is_integral_v<Number> ? node.is_integer() : node.is_number();
-            if (fits) controls[name] = *node.value<Number>();
-            return fits;
+            const bool typed = std::is_integral_v<Number> ? node.is_integer() : node.is_number();
+            const auto value = typed ? node.value<Number>() : std::nullopt;
+            if (!value || !std::isfinite(static_cast<double>(*value))) return false;
+            controls[name] = *value;
+            return true;
           },
           [&controls, name] {
             const auto it = controls.find(name);

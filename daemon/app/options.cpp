@@ -38,8 +38,12 @@ void set_up(CLI::App& cli, Options& options) {
       "Environment: DTACTD_LOG sets the log level; it wins over the file, an option over it.\n"
       "DTACTD_NAME names the sensor where net.name does not, in place of the machine.\n"
       "Signals: SIGHUP reads the configuration again and takes what can change while it runs:\n"
-      "the log level, limits of clients, certificate, key and tokens; new credentials need a\n"
-      "restart. A file with a mistake changes nothing. SIGTERM and SIGINT end it.\n"
+      "the log level, limits of clients, certificate, key and tokens. A client whose token is gone\n"
+      "is disconnected. New credentials need a restart. A file with a mistake changes nothing.\n"
+      "SIGTERM and SIGINT end it.\n"
+      "Log: one line for each command that changes something, with the client's address and\n"
+      "program, the name of its token, the values and the result. In the journal DTACT_CLIENT and\n"
+      "DTACT_TOKEN find them: journalctl -u dtactd DTACT_TOKEN=NAME.\n"
       "Exit status: 0 after SIGTERM or SIGINT, 1 on an error, 2 on a wrong command line.");
 }
 

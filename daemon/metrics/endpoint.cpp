@@ -30,6 +30,16 @@ constexpr std::chrono::seconds kTimeout{5};
 
 using Text = std::function<std::string()>;
 
+/// Whether a browser that names this host cannot have been led here by a name of somebody else's
+/// (DNS rebinding): an address, or localhost. Programs that name none are no browsers.
+bool is_own_host(std::string_view host) {
+  std::string_view name = host.substr(0, host.rfind(':'));
+  if (host.starts_with('[')) name = host.substr(1, host.find(']') - 1);
+  error_code error;
+  (void)asio::ip::make_address(std::string(name), error);
+  return host.empty() || !error || name == "localhost";
+}
+
 http::response<http::string_body> answer(const http::request<http::empty_body>& request,
                                          const Text& text) {
   http::response<http::string_body> response;
@@ -37,7 +47,12 @@ http::response<http::string_body> answer(const http::request<http::empty_body>& 
   response.keep_alive(false);
   response.set(http::field::content_type, "text/plain; charset=utf-8");
   const auto path = request.target().substr(0, request.target().find('?'));
-  if (request.method() != http::verb::get) {
+  const auto host = request[http::field::host];
+  if (!is_own_host({host.data(), host.size()})) {
+    response.result(http::status::misdirected_request);
+    response.body() =
+        "the metrics are those of an address or of localhost: let a proxy name that\n";
+  } else if (request.method() != http::verb::get) {
     response.result(http::status::method_not_allowed);
     response.set(http::field::allow, "GET");
     response.body() = "only GET is answered\n";

@@ -156,6 +156,12 @@ void add_light(Families& to, const net::Overview& overview, std::int64_t now_ns)
 }
 
 void add_clients(Families& to, const net::Overview& overview) {
+  for (const auto& endpoint : overview.status.endpoints()) {
+    if (!endpoint.has_certificate_days()) continue;
+    to.gauge("dtactd_certificate_days",
+             "Days until the TLS certificate expires; negative: it has. Absent without TLS.",
+             endpoint.certificate_days());
+  }
   const net::Traffic& traffic = overview.traffic;
   to.gauge("dtactd_clients", "Clients that are connected and greeted.",
            overview.status.clients_size());

@@ -21,7 +21,7 @@ namespace {
 
 namespace asio = boost::asio;
 
-/// Requests to read calibrations and references that may wait at the same time: half of what the
+/// Requests to read or pin calibrations, or to read references, that may wait at the same time: half of what the
 /// pipeline takes, so that commands have room beside them.
 constexpr int kMaxReading = 8;
 
@@ -45,12 +45,12 @@ struct Outcome {
   [[nodiscard]] bool failed() const noexcept { return code != v1::ERROR_NONE; }
 };
 
-/// `failure`: the code when `step` throws something else than NoSuchCalibration.
+/// `failure`: the code when `step` throws something else than std::invalid_argument.
 template <typename Value, typename Step>
 Outcome<Value> attempt(v1::ErrorCode failure, const Step& step) {
   try {
     return {step(), v1::ERROR_NONE, {}};
-  } catch (const NoSuchCalibration& e) {
+  } catch (const std::invalid_argument& e) {
     return {{}, v1::ERROR_INVALID, e.what()};
   } catch (const std::exception& e) {
     return {{}, failure, e.what()};
@@ -99,15 +99,13 @@ void CalibrationCommands::get(const Requester& requester, const v1::GetCalibrati
   std::optional<std::uint64_t> number;
   if (request.has_number()) number = request.number();
   if (!number && port_.status().calibration == nullptr) {
-    return requester.first->reply_error(
-        requester.second, v1::ERROR_UNCALIBRATED,
-        "there is no calibration: make one with dtact-calibrate "
-        "depth and send it with dtactctl calibration upload, or take one "
-        "that dtactctl calibration list shows");
+    return requester.refuse(v1::ERROR_UNCALIBRATED,
+                            "there is no calibration: make one with dtact-calibrate "
+                            "depth and send it with dtactctl calibration upload, or take one "
+                            "that dtactctl calibration list shows");
   }
   if (!number) number = in_use_;
-  if (reading_ >= kMaxReading)
-    return requester.first->reply_error(requester.second, v1::ERROR_BUSY, kBusy);
+  if (reading_ >= kMaxReading) return requester.refuse(v1::ERROR_BUSY, kBusy);
   ++reading_;
   on_worker(
       [&store = store_, number] {
@@ -115,23 +113,19 @@ void CalibrationCommands::get(const Requester& requester, const v1::GetCalibrati
       },
       [requester](CalibrationCommands& self, Outcome<CalibrationFiles> read) {
         --self.reading_;
-        const auto& [session, id] = requester;
-        if (read.failed()) {
-          return session->reply_error(id, read.code, read.error);
-        }
-        auto message = reply_to(id);
-        auto& files = *message.mutable_reply()->mutable_calibration();
-        files.set_number(read.value.number);
-        files.set_name(std::move(read.value.name));
-        files.set_calibration_toml(std::move(read.value.toml));
-        files.set_reference_png(std::move(read.value.png));
-        session->send(message);
+        if (read.failed()) return requester.refuse(read.code, read.error);
+        requester.reply([&](v1::Reply& out) {
+          auto& files = *out.mutable_calibration();
+          files.set_number(read.value.number);
+          files.set_name(std::move(read.value.name));
+          files.set_calibration_toml(std::move(read.value.toml));
+          files.set_reference_png(std::move(read.value.png));
+        });
       });
 }
 
 void CalibrationCommands::list(const Requester& requester) {
-  if (reading_ >= kMaxReading)
-    return requester.first->reply_error(requester.second, v1::ERROR_BUSY, kBusy);
+  if (reading_ >= kMaxReading) return requester.refuse(v1::ERROR_BUSY, kBusy);
   ++reading_;
   using List = std::vector<StoredCalibration>;
   on_worker(
@@ -140,38 +134,33 @@ void CalibrationCommands::list(const Requester& requester) {
       },
       [requester](CalibrationCommands& self, const Outcome<List>& list) {
         --self.reading_;
-        const auto& [session, id] = requester;
-        if (list.failed()) {
-          return session->reply_error(id, list.code, list.error);
-        }
-        auto message = reply_to(id);
-        auto& calibrations = *message.mutable_reply()->mutable_calibrations();
+        if (list.failed()) return requester.refuse(list.code, list.error);
         const bool calibrated = self.port_.status().calibration != nullptr;
-        for (const auto& stored : list.value) {
-          auto& out = *calibrations.add_calibrations();
-          fill(stored, out);
-          out.set_in_use(calibrated && stored.number == self.in_use_);
-        }
-        session->send(message);
+        requester.reply([&](v1::Reply& out) {
+          for (const auto& stored : list.value) {
+            auto& one = *out.mutable_calibrations()->add_calibrations();
+            fill(stored, one);
+            one.set_in_use(calibrated && stored.number == self.in_use_);
+          }
+        });
       });
 }
 
 void CalibrationCommands::upload(const Requester& requester, const v1::UploadCalibration& request) {
-  const auto& [session, id] = requester;
   if (!valid_name(request.name())) {
-    return session->reply_error(
-        id, v1::ERROR_INVALID,
+    return requester.refuse(
+        v1::ERROR_INVALID,
         fmt::format("upload_calibration.name: \"{}\"; allowed are 1 to {} letters, digits, '-' "
                     "and '_'",
                     base::first_bytes(request.name(), wire::kMaxCalibrationName),
                     wire::kMaxCalibrationName));
   }
   if (request.calibration_toml().empty() || request.reference_png().empty()) {
-    return session->reply_error(id, v1::ERROR_INVALID,
-                                "upload_calibration: calibration_toml or reference_png is empty: "
-                                "send both files of the calibration folder");
+    return requester.refuse(v1::ERROR_INVALID,
+                            "upload_calibration: calibration_toml or reference_png is empty: "
+                            "send both files of the calibration folder");
   }
-  if (changing_) return session->reply_error(id, v1::ERROR_BUSY, kChanging);
+  if (changing_) return requester.refuse(v1::ERROR_BUSY, kChanging);
   auto files = std::make_shared<const CalibrationFiles>(CalibrationFiles{
       .name = request.name(), .toml = request.calibration_toml(), .png = request.reference_png()});
   change(requester, {.upload = std::move(files)});
@@ -179,14 +168,36 @@ void CalibrationCommands::upload(const Requester& requester, const v1::UploadCal
 
 void CalibrationCommands::activate(const Requester& requester,
                                    const v1::ActivateCalibration& request) {
-  const auto& [session, id] = requester;
   if (!request.has_number()) {
-    return session->reply_error(id, v1::ERROR_INVALID,
-                                "activate_calibration.number is not set: dtactctl calibration list "
-                                "shows the numbers there are");
+    return requester.refuse(v1::ERROR_INVALID,
+                            "activate_calibration.number is not set: dtactctl calibration list "
+                            "shows the numbers there are");
   }
-  if (changing_) return session->reply_error(id, v1::ERROR_BUSY, kChanging);
+  if (changing_) return requester.refuse(v1::ERROR_BUSY, kChanging);
   change(requester, {.number = request.number()});
+}
+
+void CalibrationCommands::pin(const Requester& requester, const v1::PinCalibration& request) {
+  if (!request.has_number()) {
+    return requester.refuse(
+        v1::ERROR_INVALID,
+        "pin_calibration.number is not set: dtactctl calibration list shows the "
+        "numbers there are");
+  }
+  if (reading_ >= kMaxReading) return requester.refuse(v1::ERROR_BUSY, kBusy);
+  ++reading_;
+  first_on_worker(
+      [&store = store_, number = request.number(), pinned = request.pinned()] {
+        return attempt<bool>(v1::ERROR_STORAGE, [&] {
+          store.pin(number, pinned);
+          return pinned;
+        });
+      },
+      [requester](CalibrationCommands& self, const Outcome<bool>& done) {
+        --self.reading_;
+        if (done.failed()) return requester.refuse(done.code, done.error);
+        requester.reply([](v1::Reply& out) { out.mutable_done(); });
+      });
 }
 
 void CalibrationCommands::change(const Requester& requester, Change change) {
@@ -207,12 +218,12 @@ void CalibrationCommands::change(const Requester& requester, Change change) {
       [requester, change](CalibrationCommands& self, Outcome<Ready> ready) mutable {
         if (ready.failed()) {
           self.changing_ = false;
-          return requester.first->reply_error(requester.second, ready.code, ready.error);
+          return requester.refuse(ready.code, ready.error);
         }
         change.name = ready.value.calibration->name;
         change.key = ready.value.key = ++self.last_key_;
         self.changing_ = submit(self.port_, requester, std::move(ready.value),
-                                [&self, requester = WeakWho(requester), change = std::move(change)](
+                                [&self, requester, change = std::move(change)](
                                     const pipeline::CommandDone& done) mutable {
                                   change.at = done.at;
                                   self.keep(requester, change);
@@ -220,7 +231,7 @@ void CalibrationCommands::change(const Requester& requester, Change change) {
       });
 }
 
-void CalibrationCommands::keep(const WeakWho& requester, const Change& change) {
+void CalibrationCommands::keep(const Requester& requester, const Change& change) {
   config_.log({LogLevel::info, fmt::format("calibration {} is in use", change.name)});
   in_use_.reset();
   if (change.upload == nullptr) {
@@ -231,17 +242,17 @@ void CalibrationCommands::keep(const WeakWho& requester, const Change& change) {
   // this camera never replaces one that does.
   first_on_worker(
       [&store = store_, change] {
-        return attempt<std::uint64_t>(v1::ERROR_STORAGE, [&] {
+        return attempt<KeptCalibration>(v1::ERROR_STORAGE, [&] {
           if (change.upload != nullptr) return store.keep(*change.upload);
           store.make_current(change.number);
-          return change.number;
+          return KeptCalibration{change.number};
         });
       },
-      [requester, change](CalibrationCommands& self, const Outcome<std::uint64_t>& kept) {
+      [requester, change](CalibrationCommands& self, const Outcome<KeptCalibration>& kept) {
         self.changing_ = false;
         if (!kept.failed()) {
-          self.in_use_ = kept.value;
-          self.hub_.number_calibration(change.key, kept.value);
+          self.in_use_ = kept.value.number;
+          self.hub_.number_calibration(change.key, kept.value.number);
         }
         self.report(change, self.in_use_);
         // The client may be gone when the change turns out to be lost after a restart.
@@ -251,20 +262,32 @@ void CalibrationCommands::keep(const WeakWho& requester, const Change& change) {
                                         "the one before: {}",
                                         change.name, kept.error)});
         }
-        const auto& [weak, id] = requester;
-        const auto session = weak.lock();
-        if (session == nullptr) return;
         if (kept.failed()) {
           // Whatever failed: it was checked and is in use, so the request itself was a valid one.
-          return session->reply_error(id, v1::ERROR_STORAGE,
-                                      "the calibration is in use, but the daemon will start with "
-                                      "the one before, since the change could not be written: " +
-                                          kept.error);
+          return requester.refuse(v1::ERROR_STORAGE,
+                                  "the calibration is in use, but the daemon will start with "
+                                  "the one before, since the change could not be written: " +
+                                      kept.error);
         }
-        auto message = reply_to(id);
-        auto& done = *message.mutable_reply()->mutable_done();
-        if (change.upload != nullptr) done.set_calibration(kept.value);
-        session->send(message);
+        if (change.upload == nullptr) {
+          return requester.reply([](v1::Reply& out) { out.mutable_done(); });
+        }
+        std::string result = fmt::format("done, calibration {}", kept.value.number);
+        for (const StoredCalibration& old : kept.value.removed) {
+          result += fmt::format(", removed {} {}", old.number, old.name);
+        }
+        requester.reply(
+            [&](v1::Reply& out) {
+              auto& done = *out.mutable_done();
+              done.set_calibration(kept.value.number);
+              for (const StoredCalibration& old : kept.value.removed) {
+                auto& one = *done.add_removed();
+                one.set_number(old.number);
+                one.set_name(old.name);
+                one.set_uploaded(old.uploaded);
+              }
+            },
+            false, result);
       });
 }
 
@@ -279,12 +302,11 @@ void CalibrationCommands::report(const Change& change, std::optional<std::uint64
 
 void CalibrationCommands::set_reconstruction(const Requester& requester,
                                              const v1::SetReconstruction& request) {
-  const auto& [session, id] = requester;
   const pipeline::Status now = port_.status();
   pipeline::ReconstructionRules rules = now.reconstruction;
   const std::string wrong = net::change(request, rules);
-  if (!wrong.empty()) return session->reply_error(id, v1::ERROR_INVALID, wrong);
-  if (changing_) return session->reply_error(id, v1::ERROR_BUSY, kChanging);
+  if (!wrong.empty()) return requester.refuse(v1::ERROR_INVALID, wrong);
+  if (changing_) return requester.refuse(v1::ERROR_BUSY, kChanging);
   changing_ = true;
   using Ready = pipeline::SetReconstruction;
   first_on_worker(
@@ -294,34 +316,30 @@ void CalibrationCommands::set_reconstruction(const Requester& requester,
       [requester, rules](CalibrationCommands& self, Outcome<Ready> ready) {
         if (ready.failed()) {
           self.changing_ = false;
-          return requester.first->reply_error(requester.second, ready.code, ready.error);
+          return requester.refuse(ready.code, ready.error);
         }
-        self.changing_ = submit(
-            self.port_, requester, std::move(ready.value),
-            [&self, requester = WeakWho(requester), rules](const pipeline::CommandDone& done) {
-              self.changing_ = false;
-              v1::ServerMessage message;
-              auto& event = *message.mutable_event();
-              fill(done.at, event);
-              fill(rules, *event.mutable_reconstruction());
-              self.hub_.broadcast(message);
-              reply(requester, done,
-                    [&](v1::Reply& out) { fill(rules, *out.mutable_reconstruction()); });
-            });
+        self.changing_ = submit(self.port_, requester, std::move(ready.value),
+                                [&self, requester, rules](const pipeline::CommandDone& done) {
+                                  self.changing_ = false;
+                                  v1::ServerMessage message;
+                                  auto& event = *message.mutable_event();
+                                  fill(done.at, event);
+                                  fill(rules, *event.mutable_reconstruction());
+                                  self.hub_.broadcast(message);
+                                  requester.reply(done, [&](v1::Reply& out) {
+                                    fill(rules, *out.mutable_reconstruction());
+                                  });
+                                });
       });
 }
 
 void CalibrationCommands::get_reference(const Requester& requester) {
-  if (reading_ >= kMaxReading)
-    return requester.first->reply_error(requester.second, v1::ERROR_BUSY, kBusy);
-  const auto copied = [this, weak = WeakWho(requester)](const pipeline::CommandDone& done) {
+  if (reading_ >= kMaxReading) return requester.refuse(v1::ERROR_BUSY, kBusy);
+  const auto copied = [this, requester](const pipeline::CommandDone& done) {
     --reading_;
-    const auto session = weak.first.lock();
-    if (session != nullptr && done.outcome == pipeline::Outcome::done) {
-      return send_reference({session, weak.second},
-                            std::get<pipeline::CopyReference>(done.command.what).copy);
-    }
-    reply(weak, done, [](v1::Reply&) {});
+    if (requester.session() == nullptr) return;
+    if (done.outcome != pipeline::Outcome::done) return requester.reply(done, [](v1::Reply&) {});
+    send_reference(requester, std::get<pipeline::CopyReference>(done.command.what).copy);
   };
   if (submit(port_, requester, pipeline::CopyReference{}, copied)) ++reading_;
 }
@@ -340,15 +358,14 @@ void CalibrationCommands::send_reference(
       [requester, reference, number = hub_.calibration_number(reference->calibration)](
           CalibrationCommands& self, Outcome<std::string> png) {
         --self.reading_;
-        if (png.failed())
-          return requester.first->reply_error(requester.second, png.code, png.error);
-        auto message = reply_to(requester.second);
-        auto& image = *message.mutable_reply()->mutable_reference();
-        image.set_png(std::move(png.value));
-        fill(reference->light, std::nullopt, *image.mutable_light());
-        image.set_sequence(reference->sequence);
-        if (number) image.set_calibration(*number);
-        requester.first->send(message);
+        if (png.failed()) return requester.refuse(png.code, png.error);
+        requester.reply([&](v1::Reply& out) {
+          auto& image = *out.mutable_reference();
+          image.set_png(std::move(png.value));
+          fill(reference->light, std::nullopt, *image.mutable_light());
+          image.set_sequence(reference->sequence);
+          if (number) image.set_calibration(*number);
+        });
       });
 }
 

@@ -18,6 +18,7 @@
 namespace dtact::v1 {
 class ActivateCalibration;
 class GetCalibration;
+class PinCalibration;
 class SetReconstruction;
 class UploadCalibration;
 }  // namespace dtact::v1
@@ -39,6 +40,7 @@ class CalibrationCommands : public std::enable_shared_from_this<CalibrationComma
   void list(const Requester& requester);
   void upload(const Requester& requester, const v1::UploadCalibration& request);
   void activate(const Requester& requester, const v1::ActivateCalibration& request);
+  void pin(const Requester& requester, const v1::PinCalibration& request);
   void get_reference(const Requester& requester);
   void set_reconstruction(const Requester& requester, const v1::SetReconstruction& request);
 
@@ -55,7 +57,7 @@ class CalibrationCommands : public std::enable_shared_from_this<CalibrationComma
   /// Reads, checks and prepares on the worker; then the pipeline uses it, then keep().
   void change(const Requester& requester, Change change);
   /// The pipeline uses the calibration: keeps it, reports and answers that.
-  void keep(const WeakWho& requester, const Change& change);
+  void keep(const Requester& requester, const Change& change);
   void send_reference(const Requester& requester,
                       const std::shared_ptr<const pipeline::ReferenceCopy>& reference);
   void report(const Change& change, std::optional<std::uint64_t> number);
@@ -89,7 +91,7 @@ class CalibrationCommands : public std::enable_shared_from_this<CalibrationComma
   /// and what the worker prepares for the one must fit the other.
   bool changing_ = false;
   std::uint64_t last_key_ = 0;  ///< The pipeline's key of the newest calibration.
-  int reading_ = 0;
+  int reading_ = 0;             ///< Requests on the worker that change nothing in the pipeline.
   std::deque<std::function<void()>> waiting_;  ///< Jobs for the worker.
   bool working_ = false;
 };

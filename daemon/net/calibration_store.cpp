@@ -2,12 +2,14 @@
 
 #include <fmt/chrono.h>
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <sys/stat.h>
 
 #include <algorithm>
 #include <cerrno>
 #include <charconv>
 #include <fstream>
+#include <ranges>
 #include <string_view>
 #include <system_error>
 #include <utility>
@@ -29,6 +31,8 @@ constexpr const char* kToml = "calibration.toml";
 constexpr const char* kPng = "reference.png";
 constexpr const char* kAccepted = "accepted.toml";
 constexpr const char* kStarts = "calibration.starts";
+constexpr const char* kRecent = "recent";
+constexpr const char* kPinned = "pinned";
 
 /// "17" → 17. Nothing for whatever else lies in the folder.
 std::optional<std::uint64_t> number_of(const fs::path& folder) {
@@ -61,23 +65,7 @@ void move_link(const fs::path& state, const fs::path& target) {
   base::sync_folder(state);
 }
 
-/// The oldest ones beyond the newest kKept, except those of `needed`.
-void remove_old(const fs::path& folders, const std::vector<std::uint64_t>& needed) {
-  const fs::path stale = folders / kStale;
-  std::error_code ignored;  // What cannot be removed only takes room.
-  auto numbers = numbers_in(folders);
-  if (numbers.size() <= FolderCalibrationStore::kKept) return;
-  numbers.resize(numbers.size() - FolderCalibrationStore::kKept);
-  for (const std::uint64_t number : numbers) {
-    if (std::ranges::find(needed, number) != needed.end()) continue;
-    // Out of the list in one step: half a folder would be listed as a damaged calibration.
-    fs::remove_all(stale, ignored);
-    fs::rename(folders / std::to_string(number), stale, ignored);
-    fs::remove_all(stale, ignored);
-  }
-}
-
-/// When a number's folder got its content: it is never written again, only renamed.
+/// When a calibration's folder got its content: it is never written again, only renamed.
 std::string time_of(const fs::path& folder) {
   struct stat about{};
   if (::stat(folder.c_str(), &about) != 0) {
@@ -199,17 +187,92 @@ void FolderCalibrationStore::write_folder(const fs::path& folders, std::uint64_t
   base::sync_folder(folders);
 }
 
-std::uint64_t FolderCalibrationStore::keep(const CalibrationFiles& files) {
+KeptCalibration FolderCalibrationStore::keep(const CalibrationFiles& files) {
   const fs::path folders = state_ / kFolders;
   fs::create_directories(folders);
   const auto numbers = numbers_in(folders);
   // The newest is never removed, so that no number comes again.
   const std::uint64_t number = numbers.empty() ? 1 : numbers.back() + 1;
   write_folder(folders, number, files);
-  const auto previous = current_number();
+  note_use(number);
   move_link(state_, fs::path(kFolders) / std::to_string(number) / files.name);
-  remove_old(folders, {number, previous.value_or(number)});
-  return number;
+  return {number, remove_old()};
+}
+
+std::vector<std::uint64_t> FolderCalibrationStore::by_use() const {
+  const std::vector<std::uint64_t> uploaded = numbers_in(state_ / kFolders);
+  std::vector<std::uint64_t> numbers;
+  const auto add = [&](std::uint64_t number) {
+    if (std::ranges::find(numbers, number) == numbers.end()) numbers.push_back(number);
+  };
+  std::ifstream noted(state_ / kFolders / kRecent);
+  for (std::uint64_t number = 0; noted >> number;) {
+    if (std::ranges::binary_search(uploaded, number)) add(number);
+  }
+  for (const std::uint64_t number : std::views::reverse(uploaded)) add(number);
+  return numbers;
+}
+
+void FolderCalibrationStore::note_use(std::uint64_t number) const {
+  std::vector<std::uint64_t> numbers = by_use();
+  std::erase(numbers, number);
+  numbers.insert(numbers.begin(), number);
+  for (const auto& entry : fs::directory_iterator(state_ / kFolders)) {
+    // Left over by a power cut.
+    if (entry.path().stem() == kRecent && entry.path().has_extension()) fs::remove(entry.path());
+  }
+  base::write_file_atomically(state_ / kFolders / kRecent,
+                              fmt::format("{}\n", fmt::join(numbers, "\n")));
+}
+
+std::vector<StoredCalibration> FolderCalibrationStore::remove_old() const {
+  const fs::path folders = state_ / kFolders;
+  const fs::path stale = folders / kStale;
+  std::error_code ignored;  // What cannot be removed only takes room.
+  std::vector<StoredCalibration> removed;
+  std::size_t kept = 0;
+  for (const std::uint64_t number : by_use()) {
+    const fs::path folder = folders / std::to_string(number);
+    if (fs::exists(folder / kPinned, ignored) || kept++ < kKept || number == current_number()) {
+      continue;
+    }
+    StoredCalibration old;
+    old.number = number;
+    try {
+      old.name = name_of(folder_of(number));
+      old.uploaded = time_of(folder_of(number));
+    } catch (const std::exception&) {
+      old.name = "damaged";
+    }
+    // Out of the list in one step: half a folder would be listed as a damaged calibration.
+    fs::remove_all(stale, ignored);
+    fs::rename(folder, stale, ignored);
+    if (!ignored) removed.push_back(std::move(old));
+    fs::remove_all(stale, ignored);
+  }
+  std::ranges::sort(removed, {}, &StoredCalibration::number);
+  return removed;
+}
+
+void FolderCalibrationStore::pin(std::uint64_t number, bool pinned) {
+  if (number == kConfiguredCalibration) {
+    throw std::invalid_argument(
+        "the calibration that the configuration names is never removed: there is nothing to pin");
+  }
+  const fs::path folder = folder_of(number).parent_path();
+  if (!pinned) {
+    fs::remove(folder / kPinned);
+    return base::sync_folder(folder);
+  }
+  std::size_t count = 0;
+  for (const std::uint64_t other : numbers_in(state_ / kFolders)) {
+    if (other != number && fs::exists(state_ / kFolders / std::to_string(other) / kPinned)) ++count;
+  }
+  if (count >= kMaxPinned) {
+    throw std::invalid_argument(
+        fmt::format("{} calibrations are pinned and no more are allowed: unpin one", count));
+  }
+  base::write_file_atomically(folder / kPinned, "");
 }
 
 std::vector<StoredCalibration> FolderCalibrationStore::list() {
@@ -220,11 +283,12 @@ std::vector<StoredCalibration> FolderCalibrationStore::list() {
     stored.number = number;
     stored.current = number == current;
     try {
-      if (number != kConfiguredCalibration) {
-        stored.uploaded = time_of(state_ / kFolders / std::to_string(number));
-      }
       const fs::path folder = folder_of(number);
       stored.name = name_of(folder);
+      if (number != kConfiguredCalibration) {
+        stored.uploaded = time_of(folder);
+        stored.pinned = fs::exists(folder.parent_path() / kPinned);
+      }
       stored.summary = summary_of(number, folder);
     } catch (const std::exception& e) {
       stored.damage = e.what();
@@ -294,6 +358,7 @@ std::shared_ptr<const calibration::Calibration> FolderCalibrationStore::load(
 void FolderCalibrationStore::make_current(std::uint64_t number) {
   const fs::path folder = folder_of(number);
   if (number != kConfiguredCalibration) {
+    note_use(number);
     return move_link(state_,
                      fs::path(kFolders) / folder.parent_path().filename() / folder.filename());
   }

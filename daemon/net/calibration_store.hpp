@@ -29,22 +29,29 @@ struct CalibrationFiles {
 /// One of those that a store has.
 struct StoredCalibration {
   std::uint64_t number = kConfiguredCalibration;
-  std::string name;                           ///< The folder's name.
-  std::string uploaded;                       ///< ISO 8601, UTC; empty for the configured one.
-  bool current = false;                       ///< The daemon starts with it.
-  std::optional<CalibrationSummary> summary;  ///< None when it cannot be read, …
-  std::string damage;                         ///< … and why not: file, line, key and fix.
+  std::string name = {};                           ///< The folder's name.
+  std::string uploaded = {};                       ///< ISO 8601, UTC; empty for the configured one.
+  bool current = false;                            ///< The daemon starts with it.
+  std::optional<CalibrationSummary> summary = {};  ///< None when it cannot be read, …
+  std::string damage = {};                         ///< … and why not: file, line, key and fix.
+  bool pinned = false;                             ///< Never removed.
+};
+
+/// What keeping an upload came to.
+struct KeptCalibration {
+  std::uint64_t number = 0;
+  std::vector<StoredCalibration> removed = {};  ///< Number, name and time of upload alone.
 };
 
 /// There is none of the number that was asked for.
-class NoSuchCalibration : public std::runtime_error {
+class NoSuchCalibration : public std::invalid_argument {
  public:
-  using std::runtime_error::runtime_error;
+  using std::invalid_argument::invalid_argument;
 };
 
 /// Where calibrations are checked and kept. Only the network part calls it, one call at a time, and
 /// on its worker thread once that runs. Everything throws std::exception naming the path; what
-/// takes a number throws NoSuchCalibration, too.
+/// takes a number throws NoSuchCalibration, too. std::invalid_argument: nothing has changed.
 class CalibrationStore {
  public:
   CalibrationStore() = default;
@@ -57,8 +64,8 @@ class CalibrationStore {
   /// key and fix.
   [[nodiscard]] virtual std::shared_ptr<const calibration::Calibration> check(
       const CalibrationFiles& files, const std::optional<calibration::FrameSize>& camera) = 0;
-  /// Stores checked files under a new number, which it returns, and makes them current.
-  virtual std::uint64_t keep(const CalibrationFiles& files) = 0;
+  /// Stores checked files under a new number and makes them current. Removes what is too much then.
+  virtual KeptCalibration keep(const CalibrationFiles& files) = 0;
   /// All there are: the configured one, then by number. Each is read and checked before it is
   /// listed for the first time, unless its files are those that check() accepted, and again when
   /// they have changed.
@@ -68,6 +75,9 @@ class CalibrationStore {
       std::uint64_t number, const std::optional<calibration::FrameSize>& camera) = 0;
   /// Makes one current.
   virtual void make_current(std::uint64_t number) = 0;
+  /// A pinned one is never removed. Throws std::invalid_argument for the configured one, and when
+  /// too many are pinned.
+  virtual void pin(std::uint64_t number, bool pinned) = 0;
   /// Nothing when there is none, or when the current one has no number. Throws nothing.
   [[nodiscard]] virtual std::optional<std::uint64_t> current_number() const = 0;
   /// The one that the daemon started with: the current one, unless that had to be passed over.
@@ -85,15 +95,18 @@ class CalibrationStore {
 ///     STATE/calibrations/2/ball/…                                 the current one
 ///     STATE/calibration → calibrations/2/ball
 ///     STATE/calibration.starts                                    while a start is under way
+///     STATE/calibrations/recent                                   the numbers in the order of their use
+///     STATE/calibrations/1/pinned                                 an empty file
 ///
 /// Without the link the configured folder is current. A number's folder is written and synced as a
 /// whole beside the others and renamed into place; then the link moves by a rename. So at
 /// any moment, also after a power cut, there is one whole current calibration.
 class FolderCalibrationStore : public CalibrationStore {
  public:
-  /// Uploaded calibrations that stay, besides the current one and the one that was current before
-  /// it. About 0.5 MB each at 800×600.
-  static constexpr std::size_t kKept = 20;
+  /// Uploaded calibrations that stay besides pinned ones: those that were in use last, the current
+  /// one among them. About 0.5 MB each at 800×600.
+  static constexpr std::size_t kKept = 10;
+  static constexpr std::size_t kMaxPinned = 20;
 
   /// Starts in a row that may end while they read the current uploaded calibration.
   static constexpr int kMaxFailedStarts = 3;
@@ -114,11 +127,12 @@ class FolderCalibrationStore : public CalibrationStore {
 
   [[nodiscard]] std::shared_ptr<const calibration::Calibration> check(
       const CalibrationFiles& files, const std::optional<calibration::FrameSize>& camera) override;
-  std::uint64_t keep(const CalibrationFiles& files) override;
+  KeptCalibration keep(const CalibrationFiles& files) override;
   [[nodiscard]] std::vector<StoredCalibration> list() override;
   [[nodiscard]] std::shared_ptr<const calibration::Calibration> load(
       std::uint64_t number, const std::optional<calibration::FrameSize>& camera) override;
   void make_current(std::uint64_t number) override;
+  void pin(std::uint64_t number, bool pinned) override;
   /// Nothing also when the link leads elsewhere.
   [[nodiscard]] std::optional<std::uint64_t> current_number() const override;
   [[nodiscard]] std::optional<std::uint64_t> started_number() const override;
@@ -162,6 +176,12 @@ class FolderCalibrationStore : public CalibrationStore {
   [[nodiscard]] static Stamp stamp_of(const std::filesystem::path& file);
   /// STATE/calibrations/NUMBER/NAME of an uploaded one, or the configured folder.
   [[nodiscard]] std::filesystem::path folder_of(std::uint64_t number) const;
+  /// Uploaded ones in the order of their use, the last first; what was never noted, by upload.
+  [[nodiscard]] std::vector<std::uint64_t> by_use() const;
+  /// Notes that it comes into use.
+  void note_use(std::uint64_t number) const;
+  /// Removes what is neither among the last kKept in use, nor pinned, nor current.
+  [[nodiscard]] std::vector<StoredCalibration> remove_old() const;
   /// The same as from load(), which takes tens of milliseconds; cached while nothing changes.
   [[nodiscard]] CalibrationSummary summary_of(std::uint64_t number,
                                               const std::filesystem::path& folder);

@@ -61,7 +61,7 @@ Commands::Commands(asio::io_context& io, asio::thread_pool& worker, const NetCon
 
 void Commands::on_request(const std::shared_ptr<Session>& session,
                           const v1::ClientMessage& message) {
-  const Requester requester{session, message.id()};
+  const Requester requester(session, message, config_.log);
   switch (message.request_case()) {
     case v1::ClientMessage::kSubscribe:
       return subscribe(requester, message.subscribe());
@@ -79,6 +79,8 @@ void Commands::on_request(const std::shared_ptr<Session>& session,
       return calibrations_->list(requester);
     case v1::ClientMessage::kActivateCalibration:
       return calibrations_->activate(requester, message.activate_calibration());
+    case v1::ClientMessage::kPinCalibration:
+      return calibrations_->pin(requester, message.pin_calibration());
     case v1::ClientMessage::kGetReference:
       return calibrations_->get_reference(requester);
     case v1::ClientMessage::kPing:
@@ -92,7 +94,8 @@ void Commands::on_request(const std::shared_ptr<Session>& session,
 }
 
 void Commands::subscribe(const Requester& requester, const v1::Subscribe& request) {
-  const auto& [session, id] = requester;
+  const auto session = requester.session();
+  if (session == nullptr) return;
   Subscription::Map map;
   if (const auto calibration = port_.status().calibration) {
     const CalibrationSummary summary = summarise(*calibration);
@@ -100,23 +103,20 @@ void Commands::subscribe(const Requester& requester, const v1::Subscribe& reques
   }
   const auto made = Subscription::from(request, map);
   if (const auto* refusal = std::get_if<Refusal>(&made)) {
-    return session->reply_error(id, refusal->code, refusal->sentence);
+    return requester.refuse(refusal->code, refusal->sentence);
   }
   session->subscribe(std::get<Subscription>(made));
   hub_.update_want();
-  auto message = reply_to(id);
-  message.mutable_reply()->mutable_done();
-  session->send(message);
+  requester.reply([](v1::Reply& out) { out.mutable_done(); });
 }
 
 void Commands::set_light(const Requester& requester, const v1::SetLight& request) {
   hal::Light light = port_.status().light_requested;
   const std::string wrong = change(request, light);
-  if (!wrong.empty())
-    return requester.first->reply_error(requester.second, v1::ERROR_INVALID, wrong);
+  if (!wrong.empty()) return requester.refuse(v1::ERROR_INVALID, wrong);
   (void)submit(port_, requester, pipeline::SetLight{light},
-               [requester = WeakWho(requester), light](const pipeline::CommandDone& done) {
-                 reply(requester, done, [&](v1::Reply& out) {
+               [requester, light](const pipeline::CommandDone& done) {
+                 requester.reply(done, [&](v1::Reply& out) {
                    fill(light, done.light_since_ns, *out.mutable_light());
                  });
                });
@@ -124,15 +124,13 @@ void Commands::set_light(const Requester& requester, const v1::SetLight& request
 
 void Commands::rezero(const Requester& requester, bool force) {
   (void)submit(port_, requester, pipeline::Rezero{force},
-               [requester = WeakWho(requester)](const pipeline::CommandDone& done) {
-                 reply(requester, done, [](v1::Reply& out) { out.mutable_done(); });
+               [requester](const pipeline::CommandDone& done) {
+                 requester.reply(done, [](v1::Reply& out) { out.mutable_done(); });
                });
 }
 
 void Commands::get_status(const Requester& requester) {
-  auto message = reply_to(requester.second);
-  *message.mutable_reply()->mutable_status() = overview().status;
-  requester.first->send(message);
+  requester.reply([&](v1::Reply& out) { *out.mutable_status() = overview().status; });
 }
 
 Overview Commands::overview() const {
@@ -162,12 +160,13 @@ Overview Commands::overview() const {
 }
 
 void Commands::ping(const Requester& requester) {
-  auto message = reply_to(requester.second);
-  auto& pong = *message.mutable_reply()->mutable_pong();
-  auto& clock = base::system_clock();
-  pong.set_monotonic_ns(clock.monotonic_ns());
-  pong.set_wall_ns(clock.wall_ns());
-  requester.first->send(message, true);
+  requester.reply(
+      [](v1::Reply& out) {
+        auto& clock = base::system_clock();
+        out.mutable_pong()->set_monotonic_ns(clock.monotonic_ns());
+        out.mutable_pong()->set_wall_ns(clock.wall_ns());
+      },
+      true);
 }
 
 }  // namespace dtact::net

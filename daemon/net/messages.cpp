@@ -273,6 +273,7 @@ void fill(const StoredCalibration& stored, v1::StoredCalibration& out) {
   out.set_name(stored.name);
   out.set_uploaded(stored.uploaded);
   out.set_current(stored.current);
+  out.set_pinned(stored.pinned);
   if (stored.summary.has_value()) {
     fill(*stored.summary, *out.mutable_summary());
   } else {
@@ -313,12 +314,6 @@ bool fill(const pipeline::Event& event, v1::Event& out) {
     return false;
   }
   return true;
-}
-
-v1::ServerMessage reply_to(std::uint64_t id) {
-  v1::ServerMessage message;
-  message.mutable_reply()->set_id(id);
-  return message;
 }
 
 }  // namespace dtact::net

@@ -37,7 +37,4 @@ void fill(const pipeline::Stamp& at, v1::Event& out);
 /// False for CommandDone, which is an answer to one client and not an event.
 [[nodiscard]] bool fill(const pipeline::Event& event, v1::Event& out);
 
-/// An answer to the request `id`, to be filled.
-[[nodiscard]] v1::ServerMessage reply_to(std::uint64_t id);
-
 }  // namespace dtact::net

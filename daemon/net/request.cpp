@@ -33,20 +33,30 @@ bool submit(pipeline::Port& port, const Requester& requester,
             decltype(pipeline::Command::what) what,
             std::function<void(const pipeline::CommandDone&)> then) {
   if (port.submit({std::move(what), std::move(then)})) return true;
-  requester.first->reply_error(requester.second, v1::ERROR_BUSY, kBusy);
+  requester.refuse(v1::ERROR_BUSY, kBusy);
   return false;
 }
 
-void reply(const WeakWho& requester, const pipeline::CommandDone& done,
-           const std::function<void(v1::Reply&)>& fill) {
-  const auto session = requester.first.lock();
+void Requester::reply(const std::function<void(v1::Reply&)>& fill, bool first,
+                      const std::string& result) const {
+  log_change(*log_, change_, result);
+  const auto session = session_.lock();
   if (session == nullptr) return;
-  if (done.outcome != pipeline::Outcome::done) {
-    return session->reply_error(requester.second, code_of(done.outcome), done.message);
-  }
-  auto message = reply_to(requester.second);
+  v1::ServerMessage message;
+  message.mutable_reply()->set_id(id_);
   fill(*message.mutable_reply());
-  session->send(message);
+  session->send(message, first);
+}
+
+void Requester::refuse(int error_code, const std::string& sentence) const {
+  log_change(*log_, change_, sentence);
+  if (const auto session = session_.lock()) session->reply_error(id_, error_code, sentence);
+}
+
+void Requester::reply(const pipeline::CommandDone& done,
+                      const std::function<void(v1::Reply&)>& fill) const {
+  if (done.outcome != pipeline::Outcome::done) return refuse(code_of(done.outcome), done.message);
+  reply(fill);
 }
 
 }  // namespace dtact::net

@@ -43,6 +43,7 @@ std::vector<std::string> Server::addresses() const { return impl_->listeners.add
 void Server::reload(const NetConfig& fresh) {
   impl_->listeners.reload(fresh);
   impl_->hub->set_endpoints(impl_->listeners.endpoints());
+  impl_->hub->end_revoked();
 }
 
 std::uint16_t Server::port() const { return impl_->listeners.port(); }

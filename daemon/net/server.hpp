@@ -41,9 +41,9 @@ class Server {
   /// The TCP port it listens on; 0 without TCP.
   [[nodiscard]] std::uint16_t port() const;
   /// Reloads certificate, key and tokens, even if their file names are unchanged, and takes
-  /// the limits of `fresh`; all for future clients. Whether TLS and tokens are in use, and
-  /// everything else, stays. Throws as the constructor, then without any change. On
-  /// the thread that runs `io`.
+  /// the limits of `fresh`, for future clients; ends those whose token is gone. Whether TLS and
+  /// tokens are in use, and everything else, stays. Throws as the constructor, then without any
+  /// change. On the thread that runs `io`.
   void reload(const NetConfig& fresh);
   /// Takes no more clients and ends every connection; then `io` has no work of ours left and run()
   /// returns. On the thread that runs `io`, or while none does.

@@ -19,12 +19,14 @@ Admission::Admission(const NetConfig& config) : config_(config), tokens_(read_to
 
 Admission::Verdict Admission::judge(const Peer& peer, const std::string& token) {
   Verdict verdict;
-  if (!tokens_.has_value() || peer.trusted) {
-    verdict.rights = Rights::control;
-  } else if (auto grant = tokens_->find(token)) {
-    verdict.rights = grant->rights;
-    verdict.token_name = std::move(grant->name);
+  if (peer.trusted) {
+    verdict.grant = {.rights = Rights::calibrate, .name = {}, .digest = {}};
+  } else if (!tokens_.has_value()) {
+    verdict.grant = {.rights = config_.anonymous_rights, .name = {}, .digest = {}};
   } else {
+    verdict.grant = tokens_->find(token);
+  }
+  if (!verdict.grant) {
     verdict.error_code = v1::ERROR_DENIED;
     verdict.sentence = token.empty() ? "this daemon asks for a token: give the client one of those "
                                        "in the daemon's token file"
@@ -48,14 +50,14 @@ Admission::Verdict Admission::judge(const Peer& peer, const std::string& token) 
   } else {
     return verdict;
   }
-  verdict.rights.reset();
+  verdict.grant.reset();
   verdict.error_code = v1::ERROR_BUSY;
   return verdict;
 }
 
 Admission::Verdict Admission::enter(const Peer& peer, const std::string& token) {
   Verdict verdict = judge(peer, token);
-  if (verdict.rights) {
+  if (verdict.grant) {
     ++clients_;
     ++hosts_[peer.host];
   }

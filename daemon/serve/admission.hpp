@@ -39,14 +39,13 @@ class Admission {
   /// Throws as read_tokens().
   explicit Admission(const NetConfig& config);
 
-  /// Counts for clients that come from now on.
+  /// Who is in already stays in until the owner of the connection asks still_allows().
   void set_tokens(std::optional<Tokens> tokens) noexcept { tokens_ = std::move(tokens); }
 
   struct Verdict {
-    std::optional<Rights> rights;  ///< Empty: refused, …
-    int error_code = 0;            ///< … as ERROR_DENIED or ERROR_BUSY, …
-    std::string sentence;          ///< … because of this.
-    std::string token_name;        ///< What the token file calls the token.
+    std::optional<Tokens::Grant> grant;  ///< Empty: refused, …
+    int error_code = 0;                  ///< … as ERROR_DENIED or ERROR_BUSY, …
+    std::string sentence;                ///< … because of this.
     /// ERROR_DENIED is to be answered after this, so that guessing takes its time: twice as long
     /// after each wrong token of the same Peer.host. Right ones are never delayed.
     std::chrono::milliseconds delay{0};
@@ -56,6 +55,10 @@ class Admission {
   /// After a Hello with this token. Who is let in counts until leave().
   [[nodiscard]] Verdict enter(const Peer& peer, const std::string& token);
   void leave(const Peer& peer);
+  /// False: its token was revoked since, or has other rights now.
+  [[nodiscard]] bool still_allows(const Tokens::Grant& grant) const {
+    return !grant.digest || (tokens_ && tokens_->holds(grant));
+  }
 
   /// A client's message takes `now` bytes instead of `before`. False when that is too much for all
   /// of them together; it counts all the same.

@@ -2,6 +2,7 @@
 
 #include "daemon/serve/security.hpp"
 #include "daemon/serve/session.hpp"
+#include "daemon/serve/tls.hpp"
 #include "proto/dtact.pb.h"
 
 namespace dtact::net {
@@ -12,6 +13,11 @@ void fill(const EndpointInfo& endpoint, v1::Endpoint& out) {
   out.set_token(endpoint.token);
   out.set_insecure(endpoint.insecure);
   out.set_fingerprint(endpoint.fingerprint);
+  if (endpoint.certificate_expires) {
+    using namespace std::chrono;
+    out.set_certificate_days(
+        days_until(*endpoint.certificate_expires, floor<seconds>(system_clock::now())));
+  }
 }
 
 void fill(const Session& session, v1::ClientStatus& out) {

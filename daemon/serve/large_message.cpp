@@ -5,6 +5,7 @@
 
 #include <cstdint>
 
+#include "proto/defaults.hpp"
 #include "proto/dtact.pb.h"
 
 namespace dtact::net {
@@ -45,9 +46,11 @@ bool few_fields(std::string_view bytes, const MayBeBytes& may_be_bytes) {
 }  // namespace
 
 bool is_plain_upload(std::string_view bytes) {
-  return few_fields(bytes, [](int field, std::string_view upload) {
+  return few_fields(bytes, [](int field, std::string_view value) {
+    if (field == v1::ClientMessage::kOnBehalfOfFieldNumber)
+      return value.size() <= wire::kMaxOnBehalfOf;
     return field == v1::ClientMessage::kUploadCalibrationFieldNumber &&
-           few_fields(upload, [](int, std::string_view) { return true; });
+           few_fields(value, [](int, std::string_view) { return true; });
   });
 }
 

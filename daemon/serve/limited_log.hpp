@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <array>
+#include <cstddef>
 #include <memory>
 #include <utility>
 
@@ -10,20 +12,27 @@
 
 namespace dtact::net {
 
-/// `log` with at most 100 lines at once and 10 a second, so that unauthenticated clients cannot
-/// fill the journal. The next line says how many were left out.
+/// `log` with a rate limit for each subject, so that no client can fill the journal, and
+/// unauthenticated ones cannot displace what is said of others. The next line about the same
+/// subject says how many were left out.
 [[nodiscard]] inline Log limited(Log log) {
-  struct State {
-    Log log;
-    TokenBucket lines{10, 100};
+  struct Limit {
+    TokenBucket lines;
     unsigned long suppressed = 0;
   };
+  struct State {
+    Log log;
+    // A program that dims the light with each frame has all of its commands in the log.
+    std::array<Limit, kLogSubjects> limits{
+        {{TokenBucket(10, 100)}, {TokenBucket(10, 100)}, {TokenBucket(100, 1000)}}};
+  };
   return [state = std::make_shared<State>(State{std::move(log)})](LogLine line) {
-    if (!state->lines.take(1)) {
-      ++state->suppressed;
+    Limit& limit = state->limits.at(static_cast<std::size_t>(line.subject));
+    if (!limit.lines.take(1)) {
+      ++limit.suppressed;
       return;
     }
-    const auto suppressed = std::exchange(state->suppressed, 0);
+    const auto suppressed = std::exchange(limit.suppressed, 0);
     if (suppressed > 0) line.text += fmt::format(" ({} lines left out before)", suppressed);
     state->log(line);
   };

@@ -7,7 +7,10 @@
 namespace dtact::net {
 
 Listeners::Listeners(boost::asio::io_context& io, NetConfig settings)
-    : config_(checked(std::move(settings))), tls_(make_tls(config_)), admission_(config_) {
+    : config_(checked(std::move(settings))),
+      tls_(make_tls(config_)),
+      certificate_watch_(io, config_, tls_),
+      admission_(config_) {
   const auto admit = [this](std::unique_ptr<Transport> transport) {
     admit_(std::make_shared<Session>(std::move(transport), config_, admission_, host_));
   };
@@ -20,6 +23,7 @@ Listeners::Listeners(boost::asio::io_context& io, NetConfig settings)
     listeners_.push_back(listen_tcp(io, config_, tls_ ? &tls_->context : nullptr, admit));
     endpoints_.push_back({listeners_.back()->address(), tls_ != nullptr, token,
                           is_insecure(config_), tls_ ? tls_->fingerprint : ""});
+    if (tls_) endpoints_.back().certificate_expires = tls_->expires;
   }
   if (listeners_.empty()) {
     throw std::runtime_error(
@@ -32,10 +36,12 @@ void Listeners::open(std::weak_ptr<SessionHost> host,
   host_ = std::move(host);
   admit_ = std::move(admit);
   for (const auto& listener : listeners_) listener->start();
+  certificate_watch_.check();
 }
 
 void Listeners::close() {
   for (const auto& listener : listeners_) listener->stop();
+  certificate_watch_.stop();
 }
 
 void Listeners::reload(const NetConfig& fresh) {
@@ -45,10 +51,14 @@ void Listeners::reload(const NetConfig& fresh) {
   if (tls_ && new_tls) {
     *tls_ = std::move(*new_tls);  // where it is, since the listener knows its place
     for (EndpointInfo& endpoint : endpoints_) {
-      if (endpoint.tls) endpoint.fingerprint = tls_->fingerprint;
+      if (!endpoint.tls) continue;
+      endpoint.fingerprint = tls_->fingerprint;
+      endpoint.certificate_expires = tls_->expires;
     }
   }
   admission_.set_tokens(std::move(new_tokens));
+  config_.tls_certificate = fresh.tls_certificate;
+  certificate_watch_.check();
   config_.max_clients = fresh.max_clients;
   config_.max_clients_per_address = fresh.max_clients_per_address;
   config_.max_requests_per_s = fresh.max_requests_per_s;

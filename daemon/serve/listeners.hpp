@@ -33,7 +33,8 @@ class Listeners {
   /// Takes no more of them.
   void close();
   /// Reads certificate, key and tokens again and takes the limits of `fresh`, for clients that
-  /// come from now on; everything else stays. Throws as the constructor, and changes nothing then.
+  /// come from now on; everything else stays. The sessions' owner then calls their
+  /// end_if_revoked(). Throws as the constructor, and changes nothing then.
   void reload(const NetConfig& fresh);
 
   /// Where it listens; a Unix socket first, TCP last.
@@ -46,6 +47,7 @@ class Listeners {
  private:
   NetConfig config_;
   std::unique_ptr<Tls> tls_;
+  CertificateWatch certificate_watch_;
   Admission admission_;
   std::weak_ptr<SessionHost> host_;
   std::function<void(const std::shared_ptr<Session>&)> admit_;

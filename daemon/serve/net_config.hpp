@@ -8,6 +8,7 @@
 #include <span>
 #include <string>
 
+#include "daemon/serve/rights.hpp"
 #include "proto/defaults.hpp"
 #include "proto/features.hpp"
 
@@ -15,11 +16,21 @@ namespace dtact::net {
 
 enum class LogLevel : std::uint8_t { info, warning };
 
+/// What a line is about. Each has a rate limit of its own (limited()).
+enum class LogSubject : std::uint8_t {
+  general,
+  unauthenticated,  ///< A client that has not been let in.
+  change            ///< A command that changes something.
+};
+inline constexpr std::size_t kLogSubjects = 3;
+
 /// What the network part wants said.
 struct LogLine {
   LogLevel level = LogLevel::info;
   std::string text;
   std::string client = {};  ///< The client concerned, as Peer.address; may be empty.
+  LogSubject subject = LogSubject::general;
+  std::string token = {};  ///< The name of the client's token; may be empty.
 };
 /// Called on the network thread only; must not throw.
 using Log = std::function<void(const LogLine&)>;
@@ -38,6 +49,7 @@ struct NetConfig {
   std::filesystem::path tls_key;
   /// See Tokens. With it every client needs a token, but for Peer.trusted; without it none does.
   std::filesystem::path token_file;
+  Rights anonymous_rights = Rights::calibrate;  ///< Of every client where there is no token file.
   /// More are refused with a sentence; see Admission::kReserved.
   std::size_t max_clients = 32;
   std::size_t max_clients_per_address = 16;  ///< The same for each Peer.host.

@@ -51,7 +51,10 @@ NetConfig checked(NetConfig config) {
          fmt::format(
              "net.listen_insecure: every host that reaches {} may {} the sensor, since there is no "
              "{}",
-             config.address, config.token_file.empty() ? "watch and command" : "watch",
+             config.address,
+             config.token_file.empty() && config.anonymous_rights > Rights::view
+                 ? "watch and command"
+                 : "watch",
              config.token_file.empty() ? "token" : "TLS to keep a token secret")});
   }
   config.log = limited(std::move(config.log));

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <chrono>
+#include <optional>
 #include <string>
 
 #include "daemon/serve/net_config.hpp"
@@ -13,6 +15,7 @@ struct EndpointInfo {
   bool token = false;
   bool insecure = false;
   std::string fingerprint;
+  std::optional<std::chrono::sys_seconds> certificate_expires = {};
 };
 
 /// Whether the TCP address is one that other machines reach; not when it is no address.

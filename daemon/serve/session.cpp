@@ -7,6 +7,7 @@
 #include <boost/asio/error.hpp>
 #include <utility>
 
+#include "daemon/serve/change_log.hpp"
 #include "daemon/serve/large_message.hpp"
 #include "proto/dtact.pb.h"
 
@@ -26,21 +27,17 @@ constexpr std::size_t kSmall = std::size_t{64} * 1024;
 constexpr std::size_t kInputBeforeHello = 1024;
 constexpr std::size_t kInput = 16384;
 
-std::string printable(std::string text) {
-  std::replace_if(
-      text.begin(), text.end(), [](unsigned char c) { return c < 0x20 || c == 0x7f; }, '?');
-  return text;
-}
-
-/// Whether RIGHTS_VIEW is enough. A request unknown to this daemon does no harm.
-bool is_for_viewers(v1::ClientMessage::RequestCase request) {
+/// The least rights that allow it. A request unknown to this daemon does no harm.
+Rights rights_for(v1::ClientMessage::RequestCase request) {
   switch (request) {
     case v1::ClientMessage::kSetLight:
     case v1::ClientMessage::kRezero:
+    case v1::ClientMessage::kSetReconstruction:
+      return Rights::control;
     case v1::ClientMessage::kUploadCalibration:
     case v1::ClientMessage::kActivateCalibration:
-    case v1::ClientMessage::kSetReconstruction:
-      return false;
+    case v1::ClientMessage::kPinCalibration:
+      return Rights::calibrate;
     case v1::ClientMessage::kHello:
     case v1::ClientMessage::kSubscribe:
     case v1::ClientMessage::kGetStatus:
@@ -49,9 +46,15 @@ bool is_for_viewers(v1::ClientMessage::RequestCase request) {
     case v1::ClientMessage::kGetReference:
     case v1::ClientMessage::kPing:
     case v1::ClientMessage::REQUEST_NOT_SET:
-      return true;
+      return Rights::view;
   }
-  return true;
+  return Rights::view;
+}
+
+const char* denial(Rights needed) {
+  return needed == Rights::calibrate
+             ? "this client may not change calibrations: connect with a token that allows calibrate"
+             : "this client may view only: connect with a token that allows control";
 }
 
 }  // namespace
@@ -83,7 +86,7 @@ void Session::arm_timer(std::chrono::milliseconds after, const char* reason) {
 }
 
 void Session::read() {
-  input_.resize(rights_ ? kInput : kInputBeforeHello);
+  input_.resize(grant_ ? kInput : kInputBeforeHello);
   transport_->read_some(asio::buffer(input_),
                         [self = shared_from_this()](const error_code& error, std::size_t size) {
                           if (self->state_ == State::closed) return;
@@ -103,7 +106,7 @@ void Session::take(std::string_view input) {
           fmt::format("a message of {} bytes was announced, at most {} are allowed{}: "
                       "check that the client speaks dtact.proto with big-endian "
                       "lengths",
-                      decoder_.announced(), decoder_.cap(), rights_ ? "" : " before Hello"));
+                      decoder_.announced(), decoder_.cap(), grant_ ? "" : " before Hello"));
     }
     if (!has_room()) {
       return end_with(0, v1::ERROR_FLOOD,
@@ -166,10 +169,9 @@ void Session::on_message() {
     return reply_error(message.id(), v1::ERROR_INVALID,
                        "hello: sent already; it is the first message only");
   }
-  if (rights_ == Rights::view && !is_for_viewers(message.request_case())) {
-    return reply_error(message.id(), v1::ERROR_DENIED,
-                       "this client's token allows viewing only: connect with one that allows "
-                       "control");
+  if (const Rights needed = rights_for(message.request_case()); rights() < needed) {
+    log_change(config_.log, describe_change(*this, message), denial(needed));
+    return reply_error(message.id(), v1::ERROR_DENIED, denial(needed));
   }
   if (const auto host = host_.lock()) host->on_request(shared_from_this(), message);
 }
@@ -194,17 +196,16 @@ void Session::on_hello(std::uint64_t id, const v1::Hello& hello) {
   const auto verdict = admission_.enter(peer(), hello.token());
   if (verdict.error_code == v1::ERROR_DENIED) return deny(id, verdict);
   // It is the connection that is refused, as by daemons that said so before Hello: id 0.
-  if (!verdict.rights) return end_with(0, verdict.error_code, verdict.sentence);
-  rights_ = verdict.rights;
-  token_name_ = verdict.token_name;
+  if (!verdict.grant) return end_with(0, verdict.error_code, verdict.sentence);
+  grant_ = verdict.grant;
   timer_.cancel();
   state_ = State::ready;
   decoder_.set_cap(wire::kMaxMessage);
   program_ = printable(hello.program());
   config_.log({LogLevel::info,
                fmt::format("client {} ({}) connected{}{}", peer().address, program_,
-                           verdict.token_name.empty() ? "" : " as ", verdict.token_name),
-               peer().address});
+                           grant_->name.empty() ? "" : " as ", grant_->name),
+               peer().address, LogSubject::general, grant_->name});
   v1::ServerMessage message;
   message.mutable_reply()->set_id(id);
   auto& reply = *message.mutable_reply()->mutable_hello();
@@ -212,7 +213,7 @@ void Session::on_hello(std::uint64_t id, const v1::Hello& hello) {
   reply.set_minor(wire::kMinor);
   reply.set_program(config_.program);
   for (const char* feature : config_.features) reply.add_features(feature);
-  reply.set_rights(static_cast<v1::Rights>(*rights_));
+  reply.set_rights(static_cast<v1::Rights>(grant_->rights));
   reply.set_name(config_.name);
   auto& frame = *reply.mutable_surface_frame();
   frame.set_frame_id(config_.frame_id);
@@ -235,6 +236,24 @@ void Session::deny(std::uint64_t id, const Admission::Verdict& verdict) {
       });
 }
 
+std::string Session::identity() const {
+  const std::string token = token_name();
+  return fmt::format("{} ({}{}{})", peer().address, program_, token.empty() ? "" : ", token ",
+                     token);
+}
+
+void Session::end_if_revoked() {
+  if (state_ != State::ready || admission_.still_allows(*grant_)) return;
+  end_with(
+      0, v1::ERROR_DENIED,
+      "this client's token was revoked, or given other rights: connect with one that is in the "
+      "daemon's token file");
+}
+
+LogSubject Session::subject() const noexcept {
+  return grant_ ? LogSubject::general : LogSubject::unauthenticated;
+}
+
 void Session::reply_error(std::uint64_t id, int error_code_, const std::string& sentence) {
   v1::ServerMessage message;
   message.mutable_reply()->set_id(id);
@@ -244,8 +263,8 @@ void Session::reply_error(std::uint64_t id, int error_code_, const std::string& 
 }
 
 void Session::end_with(std::uint64_t id, int error_code_, const std::string& sentence) {
-  config_.log(
-      {LogLevel::warning, fmt::format("client {}: {}", peer().address, sentence), peer().address});
+  config_.log({LogLevel::warning, fmt::format("client {}: {}", peer().address, sentence),
+               peer().address, subject(), token_name()});
   reply_error(id, error_code_, sentence);
   if (state_ == State::closed) return;
   // Closing at once, with bytes unread, would reset the connection and take the answer with it: so
@@ -312,7 +331,7 @@ void Session::close(const std::string& reason, LogLevel level) {
   if (state_ == State::closed) return;
   const bool known = state_ == State::ready;
   state_ = State::closed;
-  if (rights_) admission_.leave(peer());
+  if (grant_) admission_.leave(peer());
   (void)admission_.hold(std::exchange(held_, 0), 0);
   admission_.unread(this, peer().host, 0, {});
   transport_->close();
@@ -322,7 +341,7 @@ void Session::close(const std::string& reason, LogLevel level) {
     config_.log({level,
                  fmt::format("client {} ({}) disconnected: {}; {} frames sent, {} dropped",
                              peer().address, program_, reason, outbox_.sent(), outbox_.dropped()),
-                 peer().address});
+                 peer().address, subject(), token_name()});
   }
   if (const auto host = host_.lock()) host->on_closed(*this);
 }

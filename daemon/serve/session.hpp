@@ -75,15 +75,18 @@ class Session : public std::enable_shared_from_this<Session>, private Outbox::Ow
   [[nodiscard]] const Subscription& subscription() const noexcept { return subscription_; }
   [[nodiscard]] bool ready() const noexcept { return state_ == State::ready; }
   /// It said Hello, with a right token where one is needed, and there was room.
-  [[nodiscard]] bool authenticated() const noexcept { return rights_.has_value(); }
+  [[nodiscard]] bool authenticated() const noexcept { return grant_.has_value(); }
   /// It has not been let in, and may never be.
-  [[nodiscard]] bool unauthenticated() const noexcept {
-    return !rights_ && state_ != State::closed;
-  }
+  [[nodiscard]] bool unauthenticated() const noexcept { return !grant_ && state_ != State::closed; }
   /// Once it is greeted; before that it has the least.
-  [[nodiscard]] Rights rights() const noexcept { return rights_.value_or(Rights::view); }
+  [[nodiscard]] Rights rights() const noexcept { return grant_ ? grant_->rights : Rights::view; }
   /// What the token file calls its token; empty where it needed none or it has no name.
-  [[nodiscard]] const std::string& token_name() const noexcept { return token_name_; }
+  [[nodiscard]] std::string token_name() const { return grant_ ? grant_->name : std::string(); }
+  /// "192.168.1.7:40312 (dtactctl 0.1.0, token arm)"
+  [[nodiscard]] std::string identity() const;
+  /// Ends the connection of an authenticated client whose token was revoked or has other rights
+  /// now.
+  void end_if_revoked();
   [[nodiscard]] const Peer& peer() const noexcept { return transport_->peer(); }
   [[nodiscard]] const std::string& program() const noexcept { return program_; }
   /// The outbox in the client's protocol version.
@@ -109,6 +112,8 @@ class Session : public std::enable_shared_from_this<Session>, private Outbox::Ow
   void deny(std::uint64_t id, const Admission::Verdict& verdict);
   /// Sends an error as the last answer and ends.
   void end_with(std::uint64_t id, int error_code, const std::string& sentence);
+  /// Of what the log says of this client.
+  [[nodiscard]] LogSubject subject() const noexcept;
   std::shared_ptr<void> hold() override { return shared_from_this(); }
   void on_write_failed(const std::string& reason) override { close(reason); }
   void on_waiting_changed() override;
@@ -126,8 +131,7 @@ class Session : public std::enable_shared_from_this<Session>, private Outbox::Ow
   bool skipping_stalled_reader_ =
       false;  ///< The last frame was not made, since the reader has stopped.
 
-  std::optional<Rights> rights_;  ///< Once it is let in.
-  std::string token_name_;
+  std::optional<Tokens::Grant> grant_;  ///< Once it is let in.
   TokenBucket requests_;
   std::vector<char> input_;
   wire::MessageDecoder decoder_{wire::kMaxBeforeHello};

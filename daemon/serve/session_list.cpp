@@ -43,6 +43,10 @@ void SessionList::broadcast(const v1::ServerMessage& event) const {
   }
 }
 
+void SessionList::end_revoked() const {
+  for (const auto& session : sessions_) session->end_if_revoked();
+}
+
 std::shared_ptr<Session> SessionList::release(const Session* gone) {
   const auto found =
       std::ranges::find_if(sessions_, [gone](const auto& other) { return other.get() == gone; });

@@ -24,6 +24,8 @@ class SessionList {
   /// Removes a session that has ended. Null when it is not in the list. Not while iterating over
   /// all(), in which a session may end.
   std::shared_ptr<Session> release(const Session* gone);
+  /// Ends the connections whose token was revoked or has other rights now.
+  void end_revoked() const;
   /// Ends every connection.
   void dismiss(const std::string& reason);
   /// Oldest first.

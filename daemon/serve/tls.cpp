@@ -7,6 +7,7 @@
 #include <openssl/x509err.h>
 
 #include <boost/asio/buffer.hpp>
+#include <ctime>
 #include <memory>
 #include <stdexcept>
 
@@ -22,6 +23,8 @@ namespace ssl = asio::ssl;
 using boost::system::error_code;
 
 constexpr const char* kCertificateHint = "dtactctl cert makes a pair";
+/// From how many days before it expires a certificate is warned of.
+constexpr int kWarningDays = 30;
 
 [[noreturn]] void fail(const std::filesystem::path& file, const std::string& why) {
   throw std::runtime_error(fmt::format("{}: {}", file.string(), why));
@@ -75,11 +78,12 @@ void use_key(ssl::context& context, const std::filesystem::path& file,
   if (error) fail(file, fmt::format("is no PEM key ({}); {}", error.message(), kCertificateHint));
 }
 
-void check_dates(const X509* certificate, const std::filesystem::path& file) {
-  if (::X509_cmp_current_time(::X509_get0_notAfter(certificate)) < 0) {
-    fail(file,
-         fmt::format("has expired, or this machine's clock is wrong (date); {}", kCertificateHint));
+std::chrono::sys_seconds expiry_of(const X509& certificate, const std::filesystem::path& file) {
+  std::tm time{};
+  if (::ASN1_TIME_to_tm(::X509_get0_notAfter(&certificate), &time) != 1) {
+    fail(file, fmt::format("does not say until when it is good; {}", kCertificateHint));
   }
+  return std::chrono::sys_seconds(std::chrono::seconds(::timegm(&time)));
 }
 
 }  // namespace
@@ -93,13 +97,47 @@ Tls::Tls(const std::filesystem::path& certificate, const std::filesystem::path& 
   use_certificate(context, certificate);
   use_key(context, key, certificate);
   const X509* leaf = ::SSL_CTX_get0_certificate(native);
-  check_dates(leaf, certificate);
+  expires = expiry_of(*leaf, certificate);
   fingerprint = wire::fingerprint(*leaf);
 }
 
 std::unique_ptr<Tls> make_tls(const NetConfig& config) {
   if (config.tls_certificate.empty()) return nullptr;
   return std::make_unique<Tls>(config.tls_certificate, config.tls_key);
+}
+
+int days_until(std::chrono::sys_seconds then, std::chrono::sys_seconds now) {
+  return static_cast<int>(std::chrono::floor<std::chrono::days>(then - now).count());
+}
+
+CertificateWatch::CertificateWatch(asio::io_context& io, const NetConfig& config,
+                                   const std::unique_ptr<Tls>& tls)
+    : config_(config), tls_(tls), timer_(io) {}
+
+void CertificateWatch::check() {
+  if (tls_ == nullptr || stopped_) return;
+  using std::chrono::system_clock;
+  const int days =
+      days_until(tls_->expires, std::chrono::floor<std::chrono::seconds>(system_clock::now()));
+  if (days < kWarningDays) {
+    const std::string when =
+        days < 0 ? "has expired, or this machine's clock is wrong (date): clients that pin its "
+                   "fingerprint still connect, others do not"
+                 : fmt::format("expires in {} days", days);
+    config_.log(
+        {LogLevel::warning, fmt::format("the TLS certificate {} {}; {}",
+                                        config_.tls_certificate.string(), when, kCertificateHint)});
+  }
+  timer_.expires_after(std::chrono::days(1));
+  timer_.async_wait([this](const error_code& error) {
+    if (!error) check();
+  });
+}
+
+void CertificateWatch::stop() {
+  // The timer may have expired already: then its handler still comes, without an error.
+  stopped_ = true;
+  timer_.cancel();
 }
 
 }  // namespace dtact::net

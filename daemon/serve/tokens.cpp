@@ -5,7 +5,9 @@
 #include <openssl/sha.h>
 
 #include <algorithm>
+#include <array>
 #include <stdexcept>
+#include <utility>
 
 #include "proto/defaults.hpp"
 
@@ -25,15 +27,25 @@ std::vector<std::string_view> words_of(std::string_view line) {
   }
 }
 
+/// The least first.
+constexpr std::array<std::pair<std::string_view, Rights>, 3> kRights = {
+    {{"view", Rights::view}, {"control", Rights::control}, {"calibrate", Rights::calibrate}}};
+
+std::optional<Rights> rights_of(std::string_view word) {
+  const auto found = std::ranges::find(kRights, word, [](const auto& one) { return one.first; });
+  if (found == kRights.end()) return std::nullopt;
+  return found->second;
+}
+
 bool is_printable(std::string_view word) {
   return std::all_of(word.begin(), word.end(), [](char c) { return c > ' ' && c < 0x7f; });
 }
 
 /// What is wrong with a line of these words; empty: nothing.
 std::string wrong_with(const std::vector<std::string_view>& words) {
-  if (words.size() < 2 || words.size() > 3 || (words[0] != "view" && words[0] != "control")) {
-    return "a line is \"view TOKEN NAME\" or \"control TOKEN NAME\", the name may be left out: "
-           "dtactctl token --new view prints one";
+  if (words.size() < 2 || words.size() > 3 || !rights_of(words[0])) {
+    return "a line is \"view TOKEN NAME\", \"control TOKEN NAME\" or \"calibrate TOKEN NAME\", the "
+           "name may be left out: dtactctl token --new view prints one";
   }
   if (!std::all_of(words.begin(), words.end(), is_printable)) {
     return "only printable ASCII characters are allowed";
@@ -57,17 +69,16 @@ Tokens::Tokens(std::string_view text, const std::string& file) {
     text.remove_prefix(std::min(size + 1, text.size()));
     if (words.empty() || words[0].front() == '#') continue;
     std::string wrong = wrong_with(words);
-    Entry entry;
+    Grant grant;
     if (wrong.empty()) {
-      entry = {digest_of(words[1]),
-               {words[0] == "view" ? Rights::view : Rights::control,
-                std::string(words.size() == 3 ? words[2] : std::string_view())}};
-      if (entry_of(entry.digest) != nullptr) wrong = "the same token stands on a line above";
+      grant = {*rights_of(words[0]), std::string(words.size() == 3 ? words[2] : std::string_view()),
+               digest_of(words[1])};
+      if (grant_of(*grant.digest) != nullptr) wrong = "the same token stands on a line above";
     }
     if (!wrong.empty()) throw std::runtime_error(fmt::format("{}:{}: {}", file, line, wrong));
-    entries_.push_back(std::move(entry));
+    grants_.push_back(std::move(grant));
   }
-  if (entries_.empty()) {
+  if (grants_.empty()) {
     throw std::runtime_error(fmt::format(
         "{}: holds no token, so that nobody could connect: dtactctl token --new control prints one",
         file));
@@ -75,9 +86,14 @@ Tokens::Tokens(std::string_view text, const std::string& file) {
 }
 
 std::optional<Tokens::Grant> Tokens::find(std::string_view token) const {
-  const Entry* entry = entry_of(digest_of(token));
-  if (entry == nullptr) return std::nullopt;
-  return entry->grant;
+  const Grant* grant = grant_of(digest_of(token));
+  if (grant == nullptr) return std::nullopt;
+  return *grant;
+}
+
+bool Tokens::holds(const Grant& grant) const {
+  const Grant* now = grant.digest ? grant_of(*grant.digest) : nullptr;
+  return now != nullptr && now->rights == grant.rights;
 }
 
 Tokens::Digest Tokens::digest_of(std::string_view token) {
@@ -86,11 +102,11 @@ Tokens::Digest Tokens::digest_of(std::string_view token) {
   return digest;
 }
 
-const Tokens::Entry* Tokens::entry_of(const Digest& digest) const {
-  const Entry* found = nullptr;
+const Tokens::Grant* Tokens::grant_of(const Digest& digest) const {
+  const Grant* found = nullptr;
   // Compares all of them, so that the time does not reveal which one matched.
-  for (const Entry& entry : entries_) {
-    if (::CRYPTO_memcmp(entry.digest.data(), digest.data(), digest.size()) == 0) found = &entry;
+  for (const Grant& grant : grants_) {
+    if (::CRYPTO_memcmp(grant.digest->data(), digest.data(), digest.size()) == 0) found = &grant;
   }
   return found;
 }

@@ -103,8 +103,11 @@ TEST_F(Reload, TakesCertificateTokensAndLimits) {
   EXPECT_THROW((void)connect(old_, kNewToken), client::ConnectionError);
   const auto after = connect(renewed, kNewToken);
   EXPECT_EQ(after->server().rights(), v1::RIGHTS_VIEW);
-  // An earlier client stays, with its rights.
-  EXPECT_EQ(before->status().endpoints(0).fingerprint(), renewed);
+  EXPECT_EQ(after->status().endpoints(0).fingerprint(), renewed);
+  // A revoked token ends its open connections, too.
+  EXPECT_THROW((void)before->status(), client::Error);
+  EXPECT_THAT(daemon_->log(), HasSubstr("this client's token was revoked"));
+  const auto second = connect(renewed, kNewToken);
   EXPECT_THROW((void)connect(renewed, kNewToken), client::EndedByDaemon);  // the third
 }
 

@@ -114,7 +114,7 @@ TEST_F(Secure, TheSocketFileNeedsNeither) {
   client::Options local;
   local.host = "unix:" + file("sock");
   client::Client client(local);
-  EXPECT_EQ(client.server().rights(), v1::RIGHTS_CONTROL);
+  EXPECT_EQ(client.server().rights(), v1::RIGHTS_CALIBRATE);
   expect_depth(client);
   EXPECT_THAT(ctl({"--host", local.host, "status"}), HasSubstr("serving"));
 }

@@ -21,8 +21,10 @@ void use(const net::Tokens& tokens, const std::string& text) {
     if (rights.empty() || rights.front() == '#') continue;
     const auto grant = tokens.find(token);
     require(grant.has_value(), "every line's token is known");
-    require(grant->rights == (rights == "view" ? net::Rights::view : net::Rights::control),
-            "a token grants what its line says");
+    const auto said = rights == "view"      ? net::Rights::view
+                      : rights == "control" ? net::Rights::control
+                                            : net::Rights::calibrate;
+    require(grant->rights == said, "a token grants what its line says");
     const std::string other = token + "x";
     require(text.find(other) != std::string::npos || !tokens.find(other),
             "what stands nowhere in the file grants nothing");

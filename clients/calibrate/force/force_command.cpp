@@ -14,6 +14,7 @@
 #include "clients/calibrate/force/force_pairs.hpp"
 #include "clients/calibrate/offline/images.hpp"
 #include "clients/common/json.hpp"
+#include "clients/common/program.hpp"
 #include "clients/common/reports.pb.h"
 #include "daemon/calibration/calibration.hpp"
 
@@ -134,7 +135,7 @@ void add_force(CLI::App& app, cli::Context& context) {
           "--thickness-mm", options->thickness_mm,
           "Thickness of the gel, mm; left out: as the depth calibration found it, or fitted to "
           "the readings")
-      ->check(CLI::Range(0.5, 5.0));
+      ->check(cli::in_range(0.5, 5.0));
   force
       ->add_option("-o,--output", options->output,
                    "Calibration folder to write; left out: the same one")

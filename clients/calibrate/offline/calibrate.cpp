@@ -8,6 +8,7 @@
 #include "clients/calibrate/fit/evaluate.hpp"
 #include "clients/calibrate/offline/depth_build.hpp"
 #include "clients/calibrate/offline/offline.hpp"
+#include "clients/common/program.hpp"
 
 namespace dtact::ctl {
 namespace {
@@ -125,7 +126,7 @@ void add_calibrate(CLI::App& app) {
       ->type_name("FILE")
       ->take_all();
   depth->add_option("--radius-mm", options->radius_mm, "Radius of the ball, mm")
-      ->check(CLI::Range(0.1, 100.0))
+      ->check(cli::in_range(0.1, 100.0))
       ->required();
   add_map_options(*depth, options->map);
   depth

@@ -11,6 +11,7 @@
 #include "clients/calibrate/lens/pins.hpp"
 #include "clients/calibrate/offline/images.hpp"
 #include "clients/calibrate/offline/offline.hpp"
+#include "clients/common/program.hpp"
 #include "daemon/calibration/sensor_files.hpp"
 #include "hal/base/atomic_file.hpp"
 
@@ -107,7 +108,7 @@ void add_calibrate_lens(CLI::App& app) {
       ->type_name("RxC");
   lens->add_option("--pitch-mm", options->pitch_mm, "Distance of neighbouring pins, mm")
       ->capture_default_str()
-      ->check(CLI::Range(0.1, 100.0));
+      ->check(cli::in_range(0.1, 100.0));
   CLI::Option* chessboard =
       lens->add_option(
               "--chessboard", options->chessboard,
@@ -117,7 +118,7 @@ void add_calibrate_lens(CLI::App& app) {
       ->needs(lens->add_option("--squares", options->squares, "Squares across and down")
                   ->type_name("CxR"))
       ->needs(lens->add_option("--square-mm", options->square_mm, "Side of a square, mm")
-                  ->check(CLI::Range(0.1, 100.0)));
+                  ->check(cli::in_range(0.1, 100.0)));
   lens->add_option("-o,--output", options->output, "Lens file to write (TOML)")
       ->type_name("FILE")
       ->required();

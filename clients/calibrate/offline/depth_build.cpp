@@ -10,6 +10,7 @@
 #include "clients/calibrate/fit/evaluate.hpp"
 #include "clients/calibrate/fit/model/auto_build.hpp"
 #include "clients/calibrate/fit/model/model_build.hpp"
+#include "clients/common/program.hpp"
 #include "daemon/calibration/sensor_files.hpp"
 
 namespace dtact::ctl {
@@ -50,7 +51,7 @@ std::pair<std::string, std::optional<double>> split_press(const std::string& tex
   } catch (const std::exception&) {
     read = 0;
   }
-  if (read == 0 || read != text.size() - at - 1 || !(depth_mm > 0)) {
+  if (read == 0 || read != text.size() - at - 1 || !(depth_mm > 0 && depth_mm < 100)) {
     throw std::runtime_error("--press " + text + ": after @ comes a depth in millimetres");
   }
   return {text.substr(0, at), depth_mm};
@@ -59,8 +60,10 @@ std::pair<std::string, std::optional<double>> split_press(const std::string& tex
 }  // namespace
 
 void add_map_options(CLI::App& command, MapOptions& options) {
-  command.add_option("--mm-per-px", options.mm_per_px,
-                     "Scale of the depth map, mm per pixel (default: the lens's in the middle)");
+  command
+      .add_option("--mm-per-px", options.mm_per_px,
+                  "Scale of the depth map, mm per pixel (default: the lens's in the middle)")
+      ->check(cli::in_range(0.001, 1.0));
   command
       .add_option("--lens", options.lens,
                   "Lens file of calibrate lens, or a calibration folder: rectifies the map; a "

@@ -7,6 +7,7 @@
 #include "clients/calibrate/offline/images.hpp"
 #include "clients/calibrate/offline/offline.hpp"
 #include "clients/common/json.hpp"
+#include "clients/common/program.hpp"
 #include "clients/common/reports.pb.h"
 
 namespace dtact::ctl {
@@ -102,7 +103,7 @@ void add_evaluate(CLI::App& app, const bool& json) {
       ->required();
   evaluate->add_option("--radius-mm", options->radius_mm, "Radius of the ball, mm")
       ->required()
-      ->check(CLI::Range(0.1, 100.0));
+      ->check(cli::in_range(0.1, 100.0));
   evaluate->callback([options, &json] { run(*options, json); });
 }
 

@@ -22,11 +22,12 @@ constexpr int kError = 2;
 }  // namespace
 
 FoxgloveClient::FoxgloveClient(std::shared_ptr<WebSocket> socket, std::vector<Mount> mounts,
-                               net::Rights rights, std::string program,
+                               net::Tokens::Grant grant, std::string identity, std::string program,
                                std::function<void(const std::string&)> ended)
     : socket_(std::move(socket)),
       mounts_(std::move(mounts)),
-      rights_(rights),
+      grant_(std::move(grant)),
+      identity_(std::move(identity)),
       program_(std::move(program)),
       ended_(std::move(ended)) {}
 
@@ -146,13 +147,13 @@ void FoxgloveClient::call(const Call& call) {
   if (call.service == 0 || number / kServices >= mounts_.size()) {
     return fail("there is no such service");
   }
-  if (rights_ != net::Rights::control) {
-    return fail("this client's token allows viewing only: connect with one that allows control");
+  if (grant_.rights < net::Rights::control) {
+    return fail("this client may view only: connect with a token that allows control");
   }
   if (call.encoding != "json") return fail("only requests in JSON are understood");
   try {
     mounts_[number / kServices].sensor->source().request(
-        request_of(static_cast<Service>(number % kServices), call.payload),
+        request_of(static_cast<Service>(number % kServices), call.payload), identity_,
         [weak = weak_from_this(), service = call.service, id = call.call](const v1::Reply& reply) {
           const auto self = weak.lock();
           if (self == nullptr) return;

@@ -13,8 +13,8 @@
 #include "clients/web/foxglove/protocol.hpp"
 #include "clients/web/foxglove/sensor_topics.hpp"
 #include "clients/web/web_socket.hpp"
-#include "daemon/serve/rights.hpp"
 #include "daemon/serve/token_bucket.hpp"
+#include "daemon/serve/tokens.hpp"
 
 namespace dtact::web::foxglove {
 
@@ -37,11 +37,14 @@ class FoxgloveClient : public SensorTopics::Listener,
   static constexpr double kMaxRequestsPerS = 100;
 
   /// `ended` is called once, with the reason; nothing more comes of this client then.
-  FoxgloveClient(std::shared_ptr<WebSocket> socket, std::vector<Mount> mounts, net::Rights rights,
-                 std::string program, std::function<void(const std::string&)> ended);
+  /// `identity`: what the daemon's log calls it. `program`: the server's name that the client receives.
+  FoxgloveClient(std::shared_ptr<WebSocket> socket, std::vector<Mount> mounts,
+                 net::Tokens::Grant grant, std::string identity, std::string program,
+                 std::function<void(const std::string&)> ended);
 
   void start();
   void close(const std::string& reason);
+  [[nodiscard]] const net::Tokens::Grant& grant() const noexcept { return grant_; }
 
   void on_message(const SensorTopics& sensor, Topic topic,
                   const std::shared_ptr<const Message>& message) override;
@@ -71,7 +74,8 @@ class FoxgloveClient : public SensorTopics::Listener,
 
   std::shared_ptr<WebSocket> socket_;
   std::vector<Mount> mounts_;
-  net::Rights rights_;
+  net::Tokens::Grant grant_;
+  std::string identity_;
   std::string program_;
   std::function<void(const std::string&)> ended_;
   net::TokenBucket requests_{kMaxRequestsPerS, kMaxRequestsPerS};

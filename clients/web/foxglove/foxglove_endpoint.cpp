@@ -61,6 +61,15 @@ void FoxgloveEndpoint::stop() {
   for (const auto& sensor : sensors_) sensor->stop();
 }
 
+void FoxgloveEndpoint::end_revoked() {
+  const auto clients = clients_;
+  for (const auto& weak : clients) {
+    const auto client = weak.lock();
+    if (client == nullptr || admission_.still_allows(client->grant())) continue;
+    client->close("its token was revoked, or given other rights");
+  }
+}
+
 std::vector<Mount> FoxgloveEndpoint::mounts(std::string_view path) const {
   std::vector<Mount> found;
   for (const auto& sensor : sensors_) {
@@ -94,24 +103,29 @@ Upgrade FoxgloveEndpoint::upgrade(const Request& request) {
 void FoxgloveEndpoint::admit(std::shared_ptr<WebSocket> socket, const net::Peer& peer,
                              const std::string& token, std::vector<Mount> mounts) {
   const auto verdict = admission_.enter(peer, token);
-  if (!verdict.rights) {
+  if (!verdict.grant) {
     config_.log({net::LogLevel::warning,
                  fmt::format("Foxglove's client {}: {}", peer.address, verdict.sentence),
-                 peer.address});
+                 peer.address, net::LogSubject::unauthenticated});
     return refuse(socket, token.empty()
                               ? verdict.sentence + ": add ?token=… to the address of the connection"
                               : verdict.sentence);
   }
-  config_.log({net::LogLevel::info, fmt::format("Foxglove's client {} connected", peer.address),
-               peer.address});
-  const auto ended = [this, peer](const std::string& reason) {
+  const std::string& name = verdict.grant->name;
+  config_.log({net::LogLevel::info,
+               fmt::format("Foxglove's client {} connected{}{}", peer.address,
+                           name.empty() ? "" : " as ", name),
+               peer.address, net::LogSubject::general, name});
+  const auto ended = [this, peer, name](const std::string& reason) {
     admission_.leave(peer);
     config_.log({net::LogLevel::info,
                  fmt::format("Foxglove's client {} disconnected: {}", peer.address, reason),
-                 peer.address});
+                 peer.address, net::LogSubject::general, name});
   };
-  const auto client = std::make_shared<FoxgloveClient>(std::move(socket), std::move(mounts),
-                                                       *verdict.rights, config_.program, ended);
+  const std::string identity =
+      fmt::format("{} (Foxglove{}{})", peer.address, name.empty() ? "" : ", token ", name);
+  const auto client = std::make_shared<FoxgloveClient>(
+      std::move(socket), std::move(mounts), *verdict.grant, identity, config_.program, ended);
   std::erase_if(clients_, [](const auto& weak) { return weak.expired(); });
   clients_.push_back(client);
   client->start();

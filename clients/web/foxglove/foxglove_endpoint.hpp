@@ -22,6 +22,8 @@ class FoxgloveEndpoint {
 
   void start();
   void stop();
+  /// Ends the clients whose token was revoked or has other rights now.
+  void end_revoked();
   /// Whether a path is one of this door's.
   [[nodiscard]] bool knows(std::string_view path) const { return !mounts(path).empty(); }
   [[nodiscard]] Upgrade upgrade(const Request& request);

@@ -92,8 +92,16 @@ GuidedEndpoint::GuidedEndpoint(std::vector<Calibrated> sensors, fs::path work,
       admission_(admission) {}
 
 void GuidedEndpoint::stop() {
-  for (const auto& weak : std::exchange(relays_, {})) {
-    if (const auto relay = weak.lock()) relay->close();
+  for (const Open& open : std::exchange(relays_, {})) {
+    if (const auto relay = open.relay.lock()) relay->close();
+  }
+}
+
+void GuidedEndpoint::end_revoked() {
+  for (const Open& open : relays_) {
+    const auto relay = open.relay.lock();
+    if (relay == nullptr || admission_.still_allows(open.grant)) continue;
+    relay->finish("this token was revoked, or given other rights");
   }
 }
 
@@ -118,31 +126,37 @@ Upgrade GuidedEndpoint::upgrade(std::string_view path, std::string token) {
 void GuidedEndpoint::admit(const Calibrated& sensor, std::shared_ptr<WebSocket> socket,
                            const net::Peer& peer, const std::string& token) {
   const auto verdict = admission_.enter(peer, token);
-  const auto log = [this, peer, name = sensor.source->name()](const std::string& what) {
+  const std::string token_name = verdict.grant ? verdict.grant->name : "";
+  const auto log = [this, peer, token_name, admitted = verdict.grant.has_value(),
+                    name = sensor.source->name()](const std::string& what) {
     config_.log({net::LogLevel::info,
-                 fmt::format("calibration of {} by {}: {}", name, peer.address, what),
-                 peer.address});
+                 fmt::format("calibration of {} by {}{}{}: {}", name, peer.address,
+                             token_name.empty() ? "" : ", token ", token_name, what),
+                 peer.address,
+                 admitted ? net::LogSubject::change : net::LogSubject::unauthenticated,
+                 token_name});
   };
   Relay::Handlers handlers;
   handlers.begin = [this, &sensor, log, verdict](const std::string& start, Relay& relay,
                                                  Child::Handlers of_child) {
     const auto& daemon = sensor.source->daemon();
-    if (*verdict.rights != net::Rights::control ||
-        (daemon && daemon->rights() == v1::RIGHTS_VIEW)) {
-      throw std::runtime_error("this token lets you look, not calibrate");
+    if (verdict.grant->rights < net::Rights::calibrate ||
+        (daemon && daemon->rights() < v1::RIGHTS_CALIBRATE)) {
+      throw std::runtime_error(
+          "this client may not calibrate: connect with a token that allows calibrate");
     }
     auto child = begin(sensor, start, relay, std::move(of_child));
     log("begun");
     return child;
   };
-  handlers.ended = [this, peer, log, entered = verdict.rights.has_value()] {
+  handlers.ended = [this, peer, log, entered = verdict.grant.has_value()] {
     if (entered) admission_.leave(peer);
     log("over");
   };
   const auto relay = std::make_shared<Relay>(std::move(socket), std::move(handlers));
-  std::erase_if(relays_, [](const auto& weak) { return weak.expired(); });
-  relays_.push_back(relay);
-  if (!verdict.rights) return relay->refuse(verdict.sentence);
+  std::erase_if(relays_, [](const Open& open) { return open.relay.expired(); });
+  relays_.push_back({relay, verdict.grant.value_or(net::Tokens::Grant{})});
+  if (!verdict.grant) return relay->refuse(verdict.sentence);
   relay->start();
 }
 

@@ -32,6 +32,8 @@ class GuidedEndpoint {
                  const net::NetConfig& config, net::Admission& admission);
 
   void stop();
+  /// Ends the sessions whose token was revoked or has other rights now.
+  void end_revoked();
   [[nodiscard]] bool knows(std::string_view path) const { return find(path) != nullptr; }
   /// Opens a path for which knows() is true; `token`: the page's.
   [[nodiscard]] Upgrade upgrade(std::string_view path, std::string token);
@@ -49,7 +51,11 @@ class GuidedEndpoint {
   std::filesystem::path work_;
   const net::NetConfig& config_;
   net::Admission& admission_;
-  std::vector<std::weak_ptr<Relay>> relays_;
+  struct Open {
+    std::weak_ptr<Relay> relay;
+    net::Tokens::Grant grant;
+  };
+  std::vector<Open> relays_;
   std::map<std::string, std::weak_ptr<Child>> children_;  ///< By the sensor's name.
 };
 

@@ -33,6 +33,8 @@ class Relay : public std::enable_shared_from_this<Relay> {
   void start();
   /// In place of start(): says why not.
   void refuse(const std::string& sentence);
+  /// Says why, and lets the page go once it has read that.
+  void finish(const std::string& error);
   /// Ends it at once.
   void close() { over(); }
   /// A message to the page (a GuidedLine as JSON). Only the newest waiting scene is sent.
@@ -45,8 +47,6 @@ class Relay : public std::enable_shared_from_this<Relay> {
   void take(const std::string& message);
   void write_next();
   void on_child_ended(int status, const std::string& errors);
-  /// Says why, and lets the page go once it has read that.
-  void finish(const std::string& error);
   void over();
 
   std::shared_ptr<WebSocket> socket_;

@@ -58,8 +58,9 @@ class ReferenceTracker {
 
   /// Starts its thread, which writes references to the state folder and detects camera shift.
   void start() { side_.start(); }
-  /// Stops the thread after the work it has been given.
-  void stop() noexcept { side_.stop(); }
+  /// Writes a reference that still waits for it, and stops the thread after the work it has been
+  /// given. Once the capture thread has ended.
+  void stop() noexcept;
   /// Waits until all pending camera shift checks are done. Any thread.
   void settle() const noexcept { camera_shift_.settle(); }
   /// How far the camera has moved since calibration; empty: not. Any thread.
@@ -124,7 +125,7 @@ class ReferenceTracker {
 
  private:
   void use_reference() noexcept;
-  void keep_reference() noexcept;
+  void keep_reference(std::int64_t now_ns) noexcept;
 
   int width_;
   int height_;
@@ -144,6 +145,8 @@ class ReferenceTracker {
   bool other_light_ = false;  // the ring shows another than at calibration
   bool other_level_ = false;  // the reference's light is not the calibration's, and it matters
   bool keep_due_ = false;     // the reference in use waits to be written
+  /// When one by this calibration under this light was written last, CLOCK_MONOTONIC.
+  std::optional<std::int64_t> kept_ns_;
 };
 
 }  // namespace dtact::pipeline

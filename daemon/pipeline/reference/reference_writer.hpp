@@ -25,6 +25,8 @@ class ReferenceWriter {
   [[nodiscard]] bool offer(std::span<const std::uint16_t> reference_q8, const hal::Light& light,
                            std::shared_ptr<const calibration::Calibration> calibration) noexcept;
 
+  /// Waits until what was offered is written.
+  void settle() const noexcept { write_.settle(); }
   /// Why the last write failed and what to do; empty when it went well.
   [[nodiscard]] std::string message() const;
   /// A reference was written: the one of an earlier run is no longer there.

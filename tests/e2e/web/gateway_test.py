@@ -19,6 +19,7 @@ FOLDER = tempfile.TemporaryDirectory(prefix="dtact_web_")
 HERE = pathlib.Path(FOLDER.name)
 EVERYTHING = dict(depth=E.DEPTH_INT16, luma=E.LUMA_GREY8, summary=True)
 VIEW, CONTROL = "a-token-to-look-on", "a-token-to-command"
+CALIBRATE = "a-token-to-calibrate"
 left: Daemon
 right: Daemon
 gateway: Gateway
@@ -161,7 +162,7 @@ class Rights(unittest.TestCase):
     @classmethod
     def setUpClass(cls) -> None:
         tokens = HERE / "tokens"
-        tokens.write_text(f"view {VIEW} eyes\ncontrol {CONTROL} hands\n")
+        tokens.write_text(f"view {VIEW} eyes\ncontrol {CONTROL} hands\ncalibrate {CALIBRATE} bench\n")
         tokens.chmod(0o600)
         cls.gate = Gateway(HERE, "--daemon", f"left=127.0.0.1:{left.port}", "--daemon",
                            "gone=127.0.0.1:1", "--tokens", str(tokens))
@@ -181,7 +182,67 @@ class Rights(unittest.TestCase):
         with Viewer(self.gate.port, token=CONTROL) as viewer:
             self.assertEqual(viewer.hello.rights, E.RIGHTS_CONTROL)
             viewer.notice(lambda reported: reported["connected"])
+            viewer.call(set_light=M.SetLight(brightness=254))
+            error = viewer.refused(activate_calibration=M.ActivateCalibration(number=0))
+            self.assertEqual(error.code, E.ERROR_DENIED)
             viewer.call(set_light=M.SetLight(brightness=255))
+        self.assertRegex(left.text(), r"127\.0\.0\.1:\d+ \(dtact-web [^)]*\) on behalf of "
+                                      r"127\.0\.0\.1:\d+ \(test, token hands\): "
+                                      r"set_light brightness 254: done\n")
+        self.assertRegex(self.gate.text(), r"\(test, token hands\): activate_calibration 0: this client "
+                                           r"may not change calibrations")
+
+    def test_calibrate_rights(self) -> None:
+        with Viewer(self.gate.port, token=CALIBRATE) as viewer:
+            self.assertEqual(viewer.hello.rights, E.RIGHTS_CALIBRATE)
+            viewer.notice(lambda reported: reported["connected"])
+            viewer.call(activate_calibration=M.ActivateCalibration(number=0))
+
+    def test_a_guided_calibration_needs_them(self) -> None:
+        for token, expected in ((CONTROL, "may not calibrate"), (CALIBRATE, "GuidedStart")):
+            with WebSocket(self.gate.port, f"/sensors/left/calibrate?token={token}") as page:
+                page.send(b"no start" if token == CALIBRATE else b"{}", TEXT)
+                self.assertIn(expected, page.receive()[1].decode())
+
+    def test_a_reload_ends_whose_token_is_gone(self) -> None:
+        tokens = HERE / "tokens-to-revoke"
+        tokens.write_text(f"view {VIEW}\ncontrol {CONTROL} hands\n")
+        tokens.chmod(0o600)
+        gate = Gateway(HERE, "--daemon", f"left=127.0.0.1:{left.port}", "--tokens", str(tokens))
+        protocol = "foxglove.sdk.v1"
+        with Viewer(gate.port, token=VIEW) as stays, Viewer(gate.port, token=CONTROL) as goes, \
+                WebSocket(gate.port, f"/foxglove?token={CONTROL}", Sec_WebSocket_Protocol=protocol) as foxglove:
+            tokens.write_text(f"view {VIEW}\n")
+            assert gate.process is not None
+            gate.process.send_signal(signal.SIGHUP)
+            error = goes.answer(0).error
+            self.assertEqual(error.code, E.ERROR_DENIED)
+            self.assertIn("revoked", error.message)
+            for ended in (goes.socket, foxglove):
+                with self.assertRaises((Closed, ConnectionError)):
+                    while True:
+                        ended.receive()
+            stays.call(ping=M.Ping())
+            self.assertIn("certificate, key and tokens read again", gate.text())
+            # A file with a mistake changes nothing.
+            tokens.write_text("view short\n")
+            gate.process.send_signal(signal.SIGHUP)
+            until = time.monotonic() + TIMEOUT
+            while "everything stays as it was: " not in gate.text():
+                self.assertLess(time.monotonic(), until)
+                time.sleep(0.05)
+            stays.call(ping=M.Ping())
+        self.assertEqual(gate.stop(), 0)
+
+    def test_beyond_this_machine_anonymous_viewers_only_view(self) -> None:
+        beyond = ["--daemon", f"left=127.0.0.1:{left.port}", "--listen", "0.0.0.0", "--listen-insecure"]
+        for more, rights in (([], E.RIGHTS_VIEW), (["--anonymous-rights", "control"], E.RIGHTS_CONTROL)):
+            gate = Gateway(HERE, *beyond, *more)
+            with Viewer(gate.port) as viewer:
+                self.assertEqual(viewer.hello.rights, rights)
+            self.assertEqual(gate.stop(), 0)
+        with Viewer(gateway.port) as viewer:
+            self.assertEqual(viewer.hello.rights, E.RIGHTS_CALIBRATE)
 
     def test_viewers_leave_room_for_commands_and_others(self) -> None:
         """Before: 38 of 50 commands failed, and nobody else got depth."""
@@ -336,6 +397,27 @@ class Http(unittest.TestCase):
             with self.assertRaises(Refused) as refused:
                 WebSocket(gateway.port, target)
             self.assertEqual(refused.exception.status, 404, target)
+
+    def test_origins_for_foxglove(self) -> None:
+        def status(gate: Gateway, origin: str) -> int:
+            try:
+                WebSocket(gate.port, "/foxglove", Origin=origin,
+                          Sec_WebSocket_Protocol="foxglove.sdk.v1").close()
+                return 101
+            except Refused as refused:
+                return refused.status
+
+        self.assertEqual(status(gateway, "file://"), 101, "programs on the desktop")
+        for origin in ("http://localhost:8080", "https://app.foxglove.dev"):
+            self.assertEqual(status(gateway, origin), 403, origin)
+            self.assertIn(f"a page of {origin} may not look at this sensor: start dtact-web with "
+                          f"--foxglove-origin {origin}\n", gateway.text())
+        gate = Gateway(HERE, "--daemon", f"left=127.0.0.1:{left.port}", "--foxglove-origin",
+                       "http://localhost:8080")
+        for origin, expected in (("http://localhost:8080", 101), ("file://", 101),
+                                 ("https://app.foxglove.dev", 403)):
+            self.assertEqual(status(gate, origin), expected, origin)
+        self.assertEqual(gate.stop(), 0)
 
     def test_no_extension_is_agreed_on(self) -> None:
         with WebSocket(gateway.port, "/sensors/left/wire",

@@ -125,6 +125,8 @@ TEST_F(ConfigFile, WrongTypeOrValueNamesWhatIsAllowed) {
   EXPECT_THAT(error("\n[camera]\nwidth = '640'\n"),
               AllOf(HasSubstr("c.toml:3: camera.width"), HasSubstr("16 … 8192")));
   EXPECT_THAT(error("[camera]\nfps = nan\n"), HasSubstr("camera.fps"));
+  EXPECT_THAT(error("[camera.libcamera.controls]\nanalogue_gain = inf\n"),
+              HasSubstr("camera.libcamera.controls.analogue_gain"));
   EXPECT_THAT(error("[camera]\nwidth = 640.5\n"), HasSubstr("camera.width"));
   EXPECT_THAT(error("[net]\nport = 65536\n"), HasSubstr("0 … 65535"));
   EXPECT_THAT(error("[camera]\nbackend = 'usb'\n"), HasSubstr("\"null\""));

@@ -89,6 +89,17 @@ TEST_F(Offline, CalibratesAndSaysWhatItFound) {
   EXPECT_EQ(made.origin.created.size(), 20U);
 }
 
+TEST_F(Offline, RefusesSizesThatAreNone) {
+  for (const char* size : {"nan", "inf", "1e-300", "-4"}) {
+    for (const char* given : {"4.0", "0.05"}) {
+      std::vector<std::string> arguments = calibrate();
+      *(std::ranges::find(arguments, given)) = size;
+      EXPECT_THROW(run(arguments), CLI::ValidationError) << given << " as " << size;
+    }
+  }
+  EXPECT_FALSE(fs::exists(at("cal")));
+}
+
 TEST_F(Offline, RefusesADoubtfulCalibrationUnlessForced) {
   std::vector<std::string> arguments = calibrate();
   *(std::ranges::find(arguments, "0.05")) = "0.005";

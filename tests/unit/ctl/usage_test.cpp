@@ -38,6 +38,16 @@ TEST(Usage, RefusesJsonWhereThereIsNothingToPrint) {
   EXPECT_THAT(reported({"watch", "--draw", "--json"}), HasSubstr("--json"));
 }
 
+// It passes comparisons with both ends of a range.
+TEST(Usage, RefusesWhatIsNoNumber) {
+  for (const char* number : {"nan", "NaN", "-nan", "inf", "1e-300", "1e300", "-1", "1x", ""}) {
+    EXPECT_THAT(reported({"snapshot", "-o", "x.png", "--timeout", number}), HasSubstr("--timeout"))
+        << number;
+    EXPECT_THAT(reported({"reconstruction", "--max-error-um", number}), HasSubstr("--max-error-um"))
+        << number;
+  }
+}
+
 // The command line that a program asks its user to run again.
 TEST(CommandLine, HoldsEveryOptionThatWasGiven) {
   CLI::App app("test", "dtact-calibrate");

@@ -105,7 +105,7 @@ TEST_F(Zsh, OffersValuesAndFiles) {
   const std::map<std::string, Words> expected{
       {"dtactctl export press.mcap --to ", {"npy", "png", "ply", "pcd", "csv"}},
       {"dtact-calibrate depth --method=p", {"published"}},
-      {"dtactctl token --new ", {"view", "control"}},
+      {"dtactctl token --new ", {"view", "control", "calibrate"}},
       {"dtactctl export ", files},
       {"dtactd --config ", files},
       {"dtactctl calibration upload ", {"calibration"}},

@@ -73,7 +73,7 @@ class Served {
 TEST(MetricsEndpoint, MakesTheTextOnRequest) {
   const Served served;
   EXPECT_EQ(served.asked, 0);
-  EXPECT_THAT(served.ask("GET /metrics HTTP/1.1\r\nHost: x\r\n\r\n"),
+  EXPECT_THAT(served.ask("GET /metrics HTTP/1.1\r\nHost: localhost:9100\r\n\r\n"),
               AllOf(StartsWith("HTTP/1.1 200 OK\r\n"), HasSubstr("text/plain; version=0.0.4"),
                     HasSubstr("Connection: close\r\n"), EndsWith("\r\n\r\nasked 1\n")));
   EXPECT_THAT(served.ask("GET /metrics?name[]=x HTTP/1.0\r\n\r\n"), EndsWith("asked 2\n"));
@@ -81,11 +81,27 @@ TEST(MetricsEndpoint, MakesTheTextOnRequest) {
 
 TEST(MetricsEndpoint, SaysWhereTheMetricsAre) {
   const Served served;
-  EXPECT_THAT(served.ask("GET / HTTP/1.1\r\nHost: x\r\n\r\n"),
+  EXPECT_THAT(served.ask("GET / HTTP/1.1\r\nHost: localhost:9100\r\n\r\n"),
               AllOf(StartsWith("HTTP/1.1 404 "), EndsWith("the metrics are at /metrics\n")));
-  EXPECT_THAT(served.ask("DELETE /metrics HTTP/1.1\r\nHost: x\r\n\r\n"),
+  EXPECT_THAT(served.ask("DELETE /metrics HTTP/1.1\r\nHost: localhost:9100\r\n\r\n"),
               AllOf(StartsWith("HTTP/1.1 405 "), HasSubstr("Allow: GET\r\n")));
   EXPECT_EQ(served.asked, 0);
+}
+
+// A page elsewhere whose name leads here.
+TEST(MetricsEndpoint, AnswersNoForeignName) {
+  const Served served;
+  const auto ask = [&](const std::string& host) {
+    return served.ask("GET /metrics HTTP/1.1\r\nHost: " + host + "\r\n\r\n");
+  };
+  for (const char* host : {"evil.example:9100", "localhost.evil.example", "127.0.0.1.evil.example",
+                           "[]", ":9100", "[evil]:9100"}) {
+    EXPECT_THAT(ask(host), StartsWith("HTTP/1.1 421 ")) << host;
+  }
+  EXPECT_EQ(served.asked, 0);
+  for (const char* host : {"localhost", "127.0.0.1:9100", "[::1]:9100", "192.0.2.7"}) {
+    EXPECT_THAT(ask(host), StartsWith("HTTP/1.1 200 ")) << host;
+  }
 }
 
 TEST(MetricsEndpoint, EndsWhatIsNoRequest) {
@@ -100,7 +116,7 @@ TEST(MetricsEndpoint, TheSilentLockNobodyOut) {
   std::vector<base::UniqueFd> silent;
   for (int i = 0; i < 9; ++i) silent.push_back(served.connect());
   for (int i = 1; i <= 49; ++i) {
-    EXPECT_THAT(served.ask("GET /metrics HTTP/1.1\r\nHost: x\r\n\r\n"),
+    EXPECT_THAT(served.ask("GET /metrics HTTP/1.1\r\nHost: localhost:9100\r\n\r\n"),
                 EndsWith("asked " + std::to_string(i) + "\n"));
   }
   EXPECT_EQ(Served::rest(silent.front()), "");  // the oldest has lost its place

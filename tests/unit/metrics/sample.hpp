@@ -38,6 +38,8 @@ inline net::Overview overview() {
   status.mutable_calibration()->set_name("gripper");
   status.mutable_calibration()->set_method("lut");
   status.add_clients();
+  status.add_endpoints()->set_certificate_days(-3);
+  status.add_endpoints();
   auto& usage = *status.mutable_capture_thread();
   usage.set_minor_faults(11);
   usage.set_major_faults(12);

@@ -35,12 +35,13 @@ TEST(MetricsText, CountsDropsByCause) {
                            "damaged_undecodable\"} 8\n", "replaced\"} 7\n", "slow_client\"} 9\n"}) {
     EXPECT_THAT(text, HasSubstr(std::string("dtactd_frames_dropped_total{cause=\"") + line));
   }
-  EXPECT_THAT(text, AllOf(HasSubstr("dtactd_frames_total 1000\n"),
-                          HasSubstr("dtactd_camera_frames_delivered_total 1001\n"),
-                          HasSubstr("dtactd_frames_sent_total 300\n"),
-                          HasSubstr("dtactd_sent_bytes_total 12345\n"),
-                          HasSubstr("dtactd_connections_refused_total 1\n"),
-                          HasSubstr("dtactd_clients 1\n")));
+  EXPECT_THAT(text,
+              AllOf(HasSubstr("dtactd_frames_total 1000\n"),
+                    HasSubstr("dtactd_camera_frames_delivered_total 1001\n"),
+                    HasSubstr("dtactd_frames_sent_total 300\n"),
+                    HasSubstr("dtactd_sent_bytes_total 12345\n"),
+                    HasSubstr("dtactd_connections_refused_total 1\n"),
+                    HasSubstr("dtactd_certificate_days -3\n"), HasSubstr("dtactd_clients 1\n")));
 }
 
 TEST(MetricsText, IsInBaseUnits) {

@@ -72,7 +72,7 @@ TEST_F(Store, IsEmptyAtFirst) {
 
 TEST_F(Store, KeepsFilesUnderTheirName) {
   FolderCalibrationStore store(state_, {});
-  EXPECT_EQ(store.keep({"ball", "a toml", "a png"}), 1U);
+  EXPECT_EQ(store.keep({"ball", "a toml", "a png"}).number, 1U);
   const auto folder = store.current();
   EXPECT_EQ(folder, numbered(1) / "ball");
   EXPECT_EQ(base::read_file(folder / "calibration.toml"), "a toml");
@@ -91,23 +91,29 @@ TEST_F(Store, IsOnTheDiskBeforeItIsConfirmed) {
   {
     const fakes::FileLog log(state_);
     store.keep(whole("ball"));
-    EXPECT_THAT(log.calls(),
-                ElementsAre("write calibrations/.new/ball/calibration.toml.XXXXXX",
-                            "sync calibrations/.new/ball/calibration.toml.XXXXXX",
-                            "rename calibrations/.new/ball/calibration.toml.XXXXXX to "
-                            "calibrations/.new/ball/calibration.toml",
-                            "sync calibrations/.new/ball",
-                            "write calibrations/.new/ball/reference.png.XXXXXX",
-                            "sync calibrations/.new/ball/reference.png.XXXXXX",
-                            "rename calibrations/.new/ball/reference.png.XXXXXX to "
-                            "calibrations/.new/ball/reference.png",
-                            "sync calibrations/.new/ball", "sync calibrations/.new",
-                            "rename calibrations/.new to calibrations/1", "sync calibrations",
-                            "rename calibration.new to calibration", "sync ."));
+    EXPECT_THAT(
+        log.calls(),
+        ElementsAre("write calibrations/.new/ball/calibration.toml.XXXXXX",
+                    "sync calibrations/.new/ball/calibration.toml.XXXXXX",
+                    "rename calibrations/.new/ball/calibration.toml.XXXXXX to "
+                    "calibrations/.new/ball/calibration.toml",
+                    "sync calibrations/.new/ball",
+                    "write calibrations/.new/ball/reference.png.XXXXXX",
+                    "sync calibrations/.new/ball/reference.png.XXXXXX",
+                    "rename calibrations/.new/ball/reference.png.XXXXXX to "
+                    "calibrations/.new/ball/reference.png",
+                    "sync calibrations/.new/ball", "sync calibrations/.new",
+                    "rename calibrations/.new to calibrations/1", "sync calibrations",
+                    "write calibrations/recent.XXXXXX", "sync calibrations/recent.XXXXXX",
+                    "rename calibrations/recent.XXXXXX to calibrations/recent", "sync calibrations",
+                    "rename calibration.new to calibration", "sync ."));
   }
   const fakes::FileLog log(state_);
   store.make_current(1);
-  EXPECT_THAT(log.calls(), ElementsAre("rename calibration.new to calibration", "sync ."));
+  EXPECT_THAT(log.calls(),
+              ElementsAre("write calibrations/recent.XXXXXX", "sync calibrations/recent.XXXXXX",
+                          "rename calibrations/recent.XXXXXX to calibrations/recent",
+                          "sync calibrations", "rename calibration.new to calibration", "sync ."));
 }
 
 TEST_F(Store, ListsWhatEachIs) {
@@ -116,7 +122,7 @@ TEST_F(Store, ListsWhatEachIs) {
   store.keep(whole("ball"));
   // date -u -d 2026-01-31T12:00:00Z +%s
   const std::chrono::sys_time<std::chrono::seconds> noon(std::chrono::seconds(1769860800));
-  fs::last_write_time(numbered(1), fs::file_time_type::clock::from_sys(noon));
+  fs::last_write_time(numbered(1) / "ball", fs::file_time_type::clock::from_sys(noon));
   const auto all = store.list();
   ASSERT_THAT(numbers(all), ElementsAre(0, 1));
   EXPECT_EQ(all[0].name, "factory");
@@ -136,7 +142,7 @@ TEST_F(Store, ListsWhatEachIs) {
 TEST_F(Store, GoesBackToAnEarlierOne) {
   FolderCalibrationStore store(state_, {});
   store.keep(whole("ball"));
-  EXPECT_EQ(store.keep(whole("pins")), 2U);
+  EXPECT_EQ(store.keep(whole("pins")).number, 2U);
   EXPECT_EQ(current_of(store.list()), 2U);
   EXPECT_EQ(store.load(1, {})->name, "ball");
   store.make_current(1);
@@ -165,33 +171,74 @@ TEST_F(Store, GoesBackToTheConfiguredOne) {
   EXPECT_EQ(store.current(), numbered(1) / "ball");
 }
 
-TEST_F(Store, KeepsTheNewestTwentyAndTheCurrentAndTheOneBeforeIt) {
+TEST_F(Store, KeepsTheTenUsedLastAndNamesWhatItRemoves) {
   FolderCalibrationStore store(state_, {});
-  for (int i = 1; i <= 20; ++i) store.keep({"ball", std::to_string(i), "p"});
-  EXPECT_EQ(numbers(store.list()).size(), 20U);
+  for (int i = 1; i <= 10; ++i) {
+    EXPECT_THAT(store.keep({"ball", std::to_string(i), "p"}).removed, IsEmpty());
+  }
   store.make_current(1);
-  store.keep({"ball", "21", "p"});  // 1 was current before: it is kept
-  EXPECT_TRUE(fs::exists(numbered(1)));
-  EXPECT_EQ(numbers(store.list()).size(), 21U);
-  store.make_current(2);
-  store.keep({"ball", "22", "p"});  // … until another one was
-  const auto all = numbers(store.list());
-  EXPECT_EQ(all.size(), 21U);
-  EXPECT_EQ(all.front(), 2U);
-  EXPECT_EQ(all.back(), 22U);
-  store.keep({"ball", "23", "p"});
-  EXPECT_EQ(numbers(store.list()).front(), 4U);
-  EXPECT_EQ(numbers(store.list()).size(), 20U);
+  store.make_current(3);
+  const auto kept = store.keep({"ball", "11", "p"});
+  EXPECT_EQ(kept.number, 11U);
+  ASSERT_THAT(numbers(kept.removed), ElementsAre(2));  // not 1, which was in use since
+  EXPECT_EQ(kept.removed[0].name, "ball");
+  EXPECT_THAT(kept.removed[0].uploaded, HasSubstr("T"));
+  EXPECT_FALSE(fs::exists(numbered(2)));
+  // Another run knows the order, too.
+  FolderCalibrationStore again(state_, {});
+  again.make_current(4);
+  EXPECT_THAT(numbers(again.keep({"ball", "12", "p"}).removed), ElementsAre(5));
+  EXPECT_THAT(numbers(again.list()), ElementsAre(1, 3, 4, 6, 7, 8, 9, 10, 11, 12));
+}
+
+TEST_F(Store, TakesTheOrderOfUploadWhereTheOrderOfUseIsLost) {
+  FolderCalibrationStore store(state_, {});
+  for (int i = 1; i <= 10; ++i) store.keep({"ball", std::to_string(i), "p"});
+  base::write_file_atomically(state_ / "calibrations/recent", "1\n99\n-7 x\n2\n");
+  EXPECT_THAT(numbers(store.keep({"ball", "11", "p"}).removed), ElementsAre(2));
+  fs::remove(state_ / "calibrations/recent");
+  EXPECT_THAT(numbers(store.keep({"ball", "12", "p"}).removed), ElementsAre(1));
+}
+
+TEST_F(Store, KeepsPinnedOnes) {
+  FolderCalibrationStore store(state_, make_configured());
+  store.keep(whole("ball"));
+  store.keep(whole("pins"));
+  const std::string uploaded = store.list()[1].uploaded;
+  store.pin(1, true);
+  store.pin(1, true);  // again changes nothing
+  EXPECT_TRUE(store.list()[1].pinned);
+  EXPECT_FALSE(store.list()[2].pinned);
+  EXPECT_EQ(store.list()[1].uploaded, uploaded);
+  for (int i = 3; i <= 12; ++i) store.keep({"ball", std::to_string(i), "p"});
+  EXPECT_THAT(numbers(store.list()), ElementsAre(0, 1, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12));
+  EXPECT_EQ(store.load(1)->name, "ball");
+  store.pin(1, false);
+  store.pin(1, false);
+  EXPECT_THAT(numbers(store.keep({"ball", "13", "p"}).removed), ElementsAre(1, 3));
+  EXPECT_THROW(store.pin(0, true), std::invalid_argument);
+  EXPECT_THROW(store.pin(1, true), NoSuchCalibration);
+}
+
+TEST_F(Store, PinsSoManyAndNoMore) {
+  FolderCalibrationStore store(state_, {});
+  for (std::uint64_t i = 1; i <= 21; ++i) {
+    store.keep({"ball", "t", "p"});
+    if (i <= 20) store.pin(i, true);
+  }
+  EXPECT_THROW(store.pin(21, true), std::invalid_argument);
+  store.pin(7, false);
+  EXPECT_NO_THROW(store.pin(21, true));
 }
 
 TEST_F(Store, GivesNoNumberTwice) {
   FolderCalibrationStore store(state_, make_configured());
   for (int i = 1; i <= 25; ++i) store.keep({"ball", "t", "p"});
-  store.make_current(6);
+  store.make_current(16);
   FolderCalibrationStore again(state_, {});
   again.keep({"ball", "t", "p"});
   EXPECT_EQ(again.read({}).number, 26U);
-  again.make_current(7);
+  again.make_current(18);
   again.keep({"ball", "t", "p"});
   EXPECT_EQ(again.read({}).number, 27U);
 }

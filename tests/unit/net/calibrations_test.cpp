@@ -96,6 +96,34 @@ TEST(Upload, IsCheckedUsedKeptAndReported) {
   EXPECT_EQ(files.reference_png(), "png");
 }
 
+TEST(Upload, NamesWhatTheDaemonRemovedForIt) {
+  Rig rig({}, answer_done);
+  RawClient client(rig.tcp_port());
+  client.hello();
+  EXPECT_EQ(client.request(upload("ball", "good")).done().removed_size(), 0);
+  const auto done = client.request(upload("pins", "good")).done();
+  ASSERT_EQ(done.removed_size(), 1);
+  EXPECT_EQ(done.removed(0).number(), 2U);
+  EXPECT_EQ(done.removed(0).name(), "broken");
+  EXPECT_TRUE(rig.wait_log("done, calibration 5, removed 2 broken"));
+}
+
+TEST(PinCalibration, IsListed) {
+  const Rig rig;
+  RawClient client(rig.tcp_port());
+  client.hello();
+  v1::ClientMessage pin;
+  pin.mutable_pin_calibration()->set_pinned(true);
+  expect_invalid(client, pin, "pin_calibration.number is not set");
+  pin.mutable_pin_calibration()->set_number(77);
+  expect_invalid(client, pin, "there is no calibration 77");
+  pin.mutable_pin_calibration()->set_number(3);
+  EXPECT_TRUE(client.request(pin).has_done());
+  const auto all = client.request(list()).calibrations();
+  EXPECT_FALSE(all.calibrations(1).pinned());
+  EXPECT_TRUE(all.calibrations(3).pinned());
+}
+
 TEST(Upload, NamesWhatIsWrong) {
   Rig rig({}, answer_done);
   RawClient client(rig.tcp_port());

@@ -193,7 +193,7 @@ TEST(ClientLibrary, CommandsAndRefusals) {
   }
   change.set_brightness(256);
   EXPECT_THROW((void)client.set_light(change), client::Refused);
-  EXPECT_EQ(client.upload_calibration(files_of("ball", "good")), 4U);
+  EXPECT_EQ(client.upload_calibration(files_of("ball", "good")).calibration(), 4U);
   EXPECT_EQ(next<v1::Event>(client).calibration().name(), "ball");
   EXPECT_THROW((void)client.calibration(), client::Refused);
   EXPECT_EQ(client.status().clients_size(), 1);

@@ -117,7 +117,7 @@ TEST(Status, ReportsNameSerialAndWhatEachClientTook) {
   EXPECT_EQ(hello.hello().minor(), 1U);
   EXPECT_EQ(hello.hello().name(), "gripper");
   EXPECT_EQ(hello.hello().serial(), "usb-1.2");
-  EXPECT_EQ(hello.hello().rights(), v1::RIGHTS_CONTROL);
+  EXPECT_EQ(hello.hello().rights(), v1::RIGHTS_CALIBRATE);
   EXPECT_THAT(hello.hello().features(),
               testing::ElementsAre("jpeg", "reconstruction", "reference"));
   v1::ClientMessage get;
@@ -127,7 +127,7 @@ TEST(Status, ReportsNameSerialAndWhatEachClientTook) {
   EXPECT_EQ(reported.serial(), "usb-1.2");
   EXPECT_EQ(reported.light().since_ns(), 9);
   ASSERT_EQ(reported.clients_size(), 1);
-  EXPECT_EQ(reported.clients(0).rights(), v1::RIGHTS_CONTROL);
+  EXPECT_EQ(reported.clients(0).rights(), v1::RIGHTS_CALIBRATE);
   v1::ServerMessage answer;
   *answer.mutable_reply() = hello;
   EXPECT_EQ(reported.clients(0).sent_bytes(), answer.ByteSizeLong() + 4) << "with its length";

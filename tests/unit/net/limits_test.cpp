@@ -63,6 +63,18 @@ TEST(LimitedLog, SaysHowManyLinesItLeftOut) {
   EXPECT_EQ(lines.front(), "x");
 }
 
+TEST(LimitedLog, UnauthenticatedClientsDisplaceNobodyElsesLines) {
+  std::vector<std::string> lines;
+  const Log log = limited([&lines](const LogLine& line) { lines.push_back(line.text); });
+  for (int i = 0; i < 5000; ++i) log({LogLevel::warning, "x", "", LogSubject::unauthenticated});
+  lines.clear();
+  log({LogLevel::info, "somebody left"});
+  for (int i = 0; i < 1000; ++i) {
+    log({LogLevel::info, "light set", "", LogSubject::change});
+  }
+  EXPECT_EQ(lines.size(), 1001U);
+}
+
 // NOLINTBEGIN(misc-const-correctness): clang-tidy 19 takes clients that send for constants
 TEST(BeforeHello, TakesAKilobyteAndNoMore) {
   const Rig rig;
@@ -410,7 +422,7 @@ TEST(WrongTokens, AreAnsweredLaterAndLater) {
 TEST(Answers, AboveTheCapAreErrorsAndTheConnectionStays) {
   Rig rig;
   CalibrationFiles huge{.name = "huge", .toml = "toml", .png = std::string(17U << 20U, 'x')};
-  const std::uint64_t number = rig.store.keep(huge);
+  const std::uint64_t number = rig.store.keep(huge).number;
   RawClient client(rig.tcp_port());
   client.hello();
   v1::ClientMessage message;

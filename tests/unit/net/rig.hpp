@@ -29,12 +29,13 @@ class FakeStore : public CalibrationStore {
     calibration->name = files.name;
     return calibration;
   }
-  std::uint64_t keep(const CalibrationFiles& files) override {
+  KeptCalibration keep(const CalibrationFiles& files) override {
     if (files.toml == "unwritable") throw std::runtime_error("cannot write /state/x: disk full");
     files_.push_back(files);
     files_.back().number = files_.size() - 1;
     current_ = files_.back().number;
-    return current_;
+    if (current_ < 5) return {current_};
+    return {current_, {{.number = 2, .name = "broken", .uploaded = "2026-01-31T12:00:00Z"}}};
   }
   std::vector<StoredCalibration> list() override {
     std::vector<StoredCalibration> all;
@@ -43,6 +44,7 @@ class FakeStore : public CalibrationStore {
       stored.number = files.number;
       stored.name = files.name;
       stored.current = files.number == current_;
+      stored.pinned = files.number > 0 && files.number == pinned_;
       if (files.number > 0) stored.uploaded = "2026-01-31T12:00:00Z";
       if (files.toml == "bad") {
         stored.damage = "calibration.toml:3: scale missing";
@@ -60,6 +62,10 @@ class FakeStore : public CalibrationStore {
     if (at(number).toml == "unwritable") throw std::runtime_error("cannot write /state: disk full");
     current_ = number;
   }
+  void pin(std::uint64_t number, bool pinned) override {
+    (void)at(number);
+    pinned_ = pinned ? number : 0;
+  }
   [[nodiscard]] std::optional<std::uint64_t> current_number() const override { return current_; }
   CalibrationFiles read(std::optional<std::uint64_t> number) override {
     return at(number.value_or(current_));
@@ -76,6 +82,7 @@ class FakeStore : public CalibrationStore {
                                           {"broken", "bad", "png", 2},
                                           {"stuck", "unwritable", "png", 3}};
   std::uint64_t current_ = 1;
+  std::uint64_t pinned_ = 0;
 };
 
 /// A server on a free loopback port with a fake pipeline, running on a thread of its own.
@@ -107,6 +114,14 @@ class Rig {
     std::promise<Overview> reported;
     boost::asio::post(io_, [&] { reported.set_value(server_->overview()); });
     return reported.get_future().get();
+  }
+  void reload(const NetConfig& fresh) {
+    std::promise<void> done;
+    boost::asio::post(io_, [&] {
+      server_->reload(fresh);
+      done.set_value();
+    });
+    done.get_future().get();
   }
   [[nodiscard]] std::uint16_t tcp_port() const { return server_->port(); }
   [[nodiscard]] std::string log() {

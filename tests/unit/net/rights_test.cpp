@@ -20,6 +20,7 @@ using testing::Not;
 
 constexpr const char* kView = "0123456789abcdef";
 constexpr const char* kControl = "fedcba9876543210";
+constexpr const char* kCalibrate = "89abcdef01234567";
 
 /// A server that asks for tokens.
 class Guarded : public ::testing::Test {
@@ -27,7 +28,9 @@ class Guarded : public ::testing::Test {
   Guarded() {
     config_.token_file = folder_.path() / "tokens";
     base::write_file_atomically(config_.token_file,
-                                "view 0123456789abcdef eye\ncontrol fedcba9876543210 hand\n", 0600);
+                                "view 0123456789abcdef eye\ncontrol fedcba9876543210 hand\n"
+                                "calibrate 89abcdef01234567 bench\n",
+                                0600);
   }
 
   TempFolder folder_;
@@ -44,7 +47,15 @@ v1::ClientMessage message_of(void (*fill)(v1::ClientMessage&)) {
 TEST(Rights, AreEverythingWhereNoTokensAre) {
   const Rig rig;
   RawClient client(rig.tcp_port());
-  EXPECT_EQ(client.say_hello().hello().rights(), v1::RIGHTS_CONTROL);
+  EXPECT_EQ(client.say_hello().hello().rights(), v1::RIGHTS_CALIBRATE);
+}
+
+TEST(Rights, AreThoseOfTheSettingsWhereNoTokensAre) {
+  NetConfig config;
+  config.anonymous_rights = Rights::view;
+  const Rig rig(config);
+  RawClient client(rig.tcp_port());
+  EXPECT_EQ(client.say_hello().hello().rights(), v1::RIGHTS_VIEW);
 }
 
 TEST_F(Guarded, ReportsWhatATokenAllows) {
@@ -53,6 +64,8 @@ TEST_F(Guarded, ReportsWhatATokenAllows) {
   EXPECT_EQ(viewer.say_hello(kView).hello().rights(), v1::RIGHTS_VIEW);
   RawClient controller(rig.tcp_port());
   EXPECT_EQ(controller.say_hello(kControl).hello().rights(), v1::RIGHTS_CONTROL);
+  RawClient calibrator(rig.tcp_port());
+  EXPECT_EQ(calibrator.say_hello(kCalibrate).hello().rights(), v1::RIGHTS_CALIBRATE);
   EXPECT_TRUE(rig.wait_log("(raw) connected as eye"));
 }
 
@@ -105,7 +118,7 @@ TEST_F(Guarded, LetsViewersViewAndNothingElse) {
         message_of([](M& m) { m.mutable_set_reconstruction()->set_resolution("half"); })}) {
     const auto reply = viewer.request(request);
     EXPECT_EQ(reply.error().code(), v1::ERROR_DENIED) << request.ShortDebugString();
-    EXPECT_THAT(reply.error().message(), HasSubstr("allows viewing only"));
+    EXPECT_THAT(reply.error().message(), HasSubstr("connect with a token that allows"));
   }
   EXPECT_TRUE(viewer.request(message_of([](M& m) { m.mutable_get_status(); })).has_status());
   EXPECT_TRUE(viewer.request(message_of([](M& m) { m.mutable_get_calibration()->set_number(1); }))
@@ -116,6 +129,114 @@ TEST_F(Guarded, LetsViewersViewAndNothingElse) {
   RawClient controller(rig.tcp_port());
   controller.hello(kControl);
   EXPECT_TRUE(controller.request(message_of([](M& m) { m.mutable_rezero(); })).has_done());
+}
+
+TEST_F(Guarded, ControlChangesLightReferenceAndMapsButNoCalibration) {
+  const Rig rig(config_, answer_done);
+  RawClient controller(rig.tcp_port());
+  controller.hello(kControl);
+  using M = v1::ClientMessage;
+  for (const auto& request : {message_of([](M& m) { m.mutable_set_light()->set_brightness(3); }),
+                              message_of([](M& m) { m.mutable_rezero(); }), message_of([](M& m) {
+                                m.mutable_set_reconstruction()->set_resolution("half");
+                              })}) {
+    EXPECT_FALSE(controller.request(request).has_error()) << request.ShortDebugString();
+  }
+  for (const auto& request :
+       {message_of([](M& m) { m.mutable_upload_calibration()->set_name("x"); }),
+        message_of([](M& m) { m.mutable_activate_calibration()->set_number(1); }),
+        message_of([](M& m) { m.mutable_pin_calibration()->set_number(1); })}) {
+    const auto reply = controller.request(request);
+    EXPECT_EQ(reply.error().code(), v1::ERROR_DENIED) << request.ShortDebugString();
+    EXPECT_THAT(reply.error().message(), HasSubstr("a token that allows calibrate"));
+  }
+  RawClient calibrator(rig.tcp_port());
+  calibrator.hello(kCalibrate);
+  EXPECT_TRUE(
+      calibrator.request(message_of([](M& m) { m.mutable_activate_calibration()->set_number(0); }))
+          .has_done());
+}
+
+// Each command that changes something has a line in the log.
+TEST_F(Guarded, ALineNamesWhoChangedWhatAndTheResult) {
+  Rig rig(config_, answer_done);
+  RawClient controller(rig.tcp_port());
+  controller.hello(kControl);
+  using M = v1::ClientMessage;
+  (void)controller.request(message_of([](M& m) {
+    m.mutable_set_light()->set_brightness(37);
+    m.mutable_set_light()->set_scheme("scheme2");
+  }));
+  (void)controller.request(message_of([](M& m) { m.mutable_set_light()->set_brightness(256); }));
+  (void)controller.request(message_of([](M& m) {
+    m.mutable_rezero()->set_force(true);
+    m.set_on_behalf_of("192.0.2.9:50211 (page, token lab)\n" + std::string(300, 'x'));
+  }));
+  (void)controller.request(
+      message_of([](M& m) { m.mutable_set_reconstruction()->set_sharpen("off"); }));
+  (void)controller.request(
+      message_of([](M& m) { m.mutable_activate_calibration()->set_number(7); }));
+  (void)controller.request(message_of([](M& m) { m.mutable_get_status(); }));
+  RawClient calibrator(rig.tcp_port());
+  calibrator.hello(kCalibrate);
+  (void)calibrator.request(message_of([](M& m) {
+    m.mutable_upload_calibration()->set_name("ball");
+    m.mutable_upload_calibration()->set_calibration_toml("toml");
+    m.mutable_upload_calibration()->set_reference_png("image");
+  }));
+  const std::string log = rig.log();
+  const std::string who = " (raw, token hand): ";
+  EXPECT_THAT(log, HasSubstr(who + "set_light brightness 37, scheme \"scheme2\": done\n"));
+  EXPECT_THAT(log, HasSubstr(who + "set_light brightness 256: set_light.brightness: 256; allowed"));
+  EXPECT_THAT(log,
+              HasSubstr(" (raw, token hand) on behalf of 192.0.2.9:50211 (page, token lab)?xx"));
+  EXPECT_THAT(log, Not(HasSubstr(std::string(256, 'x'))));
+  EXPECT_THAT(log, HasSubstr("xx: rezero force: done\n"));
+  EXPECT_THAT(log, HasSubstr(who + "set_reconstruction sharpen \"off\": done\n"));
+  EXPECT_THAT(log, HasSubstr(who + "activate_calibration 7: this client may not change calibr"));
+  EXPECT_THAT(log,
+              HasSubstr(" (raw, token bench): upload_calibration \"ball\", 4 and 5 bytes: done, "
+                        "calibration 4\n"));
+  EXPECT_THAT(log, Not(HasSubstr("get_status")));
+}
+
+TEST_F(Guarded, TheLineComesThoughTheClientHasLeft) {
+  Rig rig(config_);
+  {
+    RawClient controller(rig.tcp_port());
+    controller.hello(kControl);
+    controller.send(message_of([](v1::ClientMessage& m) {
+      m.set_id(2);
+      m.mutable_set_light()->set_brightness(37);
+    }));
+    ASSERT_TRUE(rig.port.wait_command(0).has_value());
+  }
+  ASSERT_TRUE(rig.wait_log("disconnected"));
+  rig.port.emit(pipeline::CommandDone{*rig.port.wait_command(0), pipeline::Outcome::done, ""});
+  EXPECT_TRUE(rig.wait_log(" (raw, token hand): set_light brightness 37: done"));
+}
+
+TEST_F(Guarded, AReloadEndsWhoseTokenIsGoneOrHasOtherRights) {
+  Rig rig(config_);
+  RawClient viewer(rig.tcp_port());
+  viewer.hello(kView);
+  RawClient controller(rig.tcp_port());
+  controller.hello(kControl);
+  RawClient calibrator(rig.tcp_port());
+  calibrator.hello(kCalibrate);
+  // Another name changes nothing.
+  base::write_file_atomically(config_.token_file,
+                              "view 0123456789abcdef ear\nview 89abcdef01234567 bench\n", 0600);
+  rig.reload(config_);
+  for (RawClient* ended : {&controller, &calibrator}) {
+    const auto reply = ended->reply();
+    EXPECT_EQ(reply.id(), 0U);
+    EXPECT_EQ(reply.error().code(), v1::ERROR_DENIED);
+    EXPECT_THAT(reply.error().message(), HasSubstr("token was revoked, or given other rights"));
+    EXPECT_TRUE(ended->ends());
+  }
+  EXPECT_TRUE(viewer.request(message_of([](v1::ClientMessage& m) { m.mutable_get_status(); }))
+                  .has_status());
 }
 
 TEST_F(Guarded, ReportsStatusOfItsEndpointsAndClients) {

@@ -28,6 +28,7 @@ using calibration::TempFolder;
 using testing::AllOf;
 using testing::HasSubstr;
 using testing::MatchesRegex;
+using testing::Not;
 
 /// A client that accepts any certificate.
 class TlsClient {
@@ -259,13 +260,13 @@ TEST_F(TlsServer, NamesTheFileThatIsNoneOrWrong) {
                                HasSubstr("dtactctl cert makes a pair")));
 }
 
-/// `pair` with another last day, signed again.
-std::string expired(const ctl::Pair& pair) {
+/// `pair` with another last day, `days` from now and a minute, signed again.
+std::string expiring(const ctl::Pair& pair, int days) {
   BIO* key_text = ::BIO_new_mem_buf(pair.key.data(), static_cast<int>(pair.key.size()));
   EVP_PKEY* key = ::PEM_read_bio_PrivateKey(key_text, nullptr, nullptr, nullptr);
   BIO* text = ::BIO_new_mem_buf(pair.certificate.data(), static_cast<int>(pair.certificate.size()));
   X509* certificate = ::PEM_read_bio_X509(text, nullptr, nullptr, nullptr);
-  ::X509_gmtime_adj(::X509_getm_notAfter(certificate), -60);
+  ::X509_gmtime_adj(::X509_getm_notAfter(certificate), 86400L * days + 60);
   ::X509_sign(certificate, key, ::EVP_sha256());
   BIO* out = ::BIO_new(::BIO_s_mem());
   ::PEM_write_bio_X509(out, certificate);
@@ -278,11 +279,49 @@ std::string expired(const ctl::Pair& pair) {
   return made;
 }
 
-TEST_F(TlsServer, SaysThatACertificateHasExpired) {
+/// What status says of the certificate.
+int days_reported(const Rig& rig) {
+  TlsClient client(rig.tcp_port());
+  EXPECT_TRUE(client.hello().has_hello());
+  v1::ClientMessage get;
+  get.mutable_get_status();
+  const auto status = client.request(get).status();
+  EXPECT_TRUE(status.endpoints(0).has_certificate_days());
+  return status.endpoints(0).certificate_days();
+}
+
+// Clients that pin it do not look at its dates.
+TEST_F(TlsServer, ServesACertificateThatHasExpiredWithAWarning) {
   ctl::Pair pair = ctl::make_pair({"gripper"});
-  pair.certificate = expired(pair);
+  pair.certificate = expiring(pair, -2);
   write(pair);
-  EXPECT_THAT(refusal(), HasSubstr(config_.tls_certificate.string() + ": has expired"));
+  EXPECT_EQ(refusal(), "");
+  Rig rig(config_);
+  EXPECT_EQ(days_reported(rig), -2);
+  EXPECT_TRUE(rig.wait_log("the TLS certificate " + config_.tls_certificate.string() +
+                           " has expired, or this machine's clock is wrong"));
+}
+
+TEST_F(TlsServer, WarnsOfACertificateThirtyDaysBeforeItExpires) {
+  ctl::Pair pair = ctl::make_pair({"gripper"});
+  pair.certificate = expiring(pair, 31);
+  write(pair);
+  Rig rig(config_);
+  EXPECT_EQ(days_reported(rig), 31);
+  EXPECT_THAT(rig.log(), Not(HasSubstr("expires in")));
+  pair.certificate = expiring(pair, 29);
+  write(pair);
+  rig.reload(config_);
+  EXPECT_EQ(days_reported(rig), 29);
+  EXPECT_TRUE(rig.wait_log("expires in 29 days; dtactctl cert makes a pair"));
+}
+
+TEST(DaysUntil, RoundsDown) {
+  using std::chrono::seconds;
+  const std::chrono::sys_seconds now(seconds(1'000'000));
+  EXPECT_EQ(days_until(now + seconds(86'399), now), 0);
+  EXPECT_EQ(days_until(now + seconds(86'400), now), 1);
+  EXPECT_EQ(days_until(now - seconds(1), now), -1);
 }
 
 TEST_F(TlsServer, AReloadGivesASocketFileNoFingerprint) {

@@ -32,11 +32,14 @@ std::string refusal(const std::string& text) {
 
 TEST(Tokens, GrantWhatTheirLineSays) {
   const Tokens tokens(
-      "# for the gripper\n\n  control 0123456789abcdef arm_left\r\nview\tfedcba9876543210", "f");
+      "# for the gripper\n\n  control 0123456789abcdef arm_left\r\nview\tfedcba9876543210\n"
+      "calibrate 89abcdef01234567 bench",
+      "f");
   EXPECT_EQ(tokens.find("0123456789abcdef")->rights, Rights::control);
   EXPECT_EQ(tokens.find("0123456789abcdef")->name, "arm_left");
   EXPECT_EQ(tokens.find("fedcba9876543210")->rights, Rights::view);
   EXPECT_EQ(tokens.find("fedcba9876543210")->name, "");
+  EXPECT_EQ(tokens.find("89abcdef01234567")->rights, Rights::calibrate);
 }
 
 TEST(Tokens, KnowNoOthers) {

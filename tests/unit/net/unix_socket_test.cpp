@@ -86,7 +86,7 @@ TEST_F(UnixSocket, NeedsNoTokenOfItsOwnUser) {
   base::write_file_atomically(config_.token_file, "view 0123456789abcdef\n", 0600);
   const Rig rig(config_);
   RawClient local{connected(path_)};
-  EXPECT_EQ(local.say_hello().hello().rights(), v1::RIGHTS_CONTROL);
+  EXPECT_EQ(local.say_hello().hello().rights(), v1::RIGHTS_CALIBRATE);
 }
 
 TEST_F(UnixSocket, AsksOtherUsersForAToken) {

@@ -1,12 +1,14 @@
 #include "daemon/pipeline/reference/reference_tracker.hpp"
 
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <optional>
+#include <thread>
 #include <utility>
 
 #include "daemon/pipeline/reference/reference_store.hpp"
@@ -143,6 +145,47 @@ TEST_F(ReferenceTrackerTest, AReferenceForcedInContactIsNotKeptForTheNextStart) 
       load_reference(*calibrated_.calibration, fakes::kToyWidth, fakes::kToyHeight, folder_);
   ASSERT_TRUE(kept.has_value());
   EXPECT_NEAR(kept->image_q8[kMiddle], 150 * 256, 3 * 256);
+}
+
+// Each write waits for the disk: 10 MB in 15 s under a flood of re-zeros.
+TEST_F(ReferenceTrackerTest, ReferencesOfOneLightAreWrittenAtMostOnceInFiveMinutesAndAtTheEnd) {
+  ASSERT_TRUE(settles());
+  const auto inode = [&] {
+    struct stat about{};
+    while (::stat((folder_ / "reference.png").c_str(), &about) != 0) std::this_thread::yield();
+    return about.st_ino;
+  };
+  const auto rezero = [&] {
+    ASSERT_EQ(image_.rezero(false), std::nullopt);
+    show(2 * kReferenceFrames);
+  };
+  const auto first = inode();
+  for (int i = 0; i < 20; ++i) rezero();
+  EXPECT_EQ(inode(), first);
+  now_ns_ += 300'000'000'000;
+  show(1);
+  while (inode() == first) std::this_thread::yield();
+  const auto second = inode();
+  rezero();
+  EXPECT_EQ(inode(), second);
+  image_.stop();
+  EXPECT_NE(inode(), second);
+}
+
+TEST_F(ReferenceTrackerTest, AReferenceOfAnotherLightIsWrittenAtOnce) {
+  ASSERT_TRUE(settles());
+  hal::Light dim = config_.light;
+  dim.brightness = 128;
+  set_light(dim);
+  scene_.light = 0.9;
+  show(4 * kReferenceFrames);
+  ASSERT_EQ(image_.quality(), ReferenceQuality::fresh);
+  const auto written = [&] {
+    const auto kept =
+        load_reference(*calibrated_.calibration, fakes::kToyWidth, fakes::kToyHeight, folder_);
+    return kept && kept->light == dim;
+  };
+  while (!written()) std::this_thread::yield();  // the test's time limit ends it
 }
 
 // For example, the ring re-sends its light and flickers.

@@ -99,6 +99,21 @@ TEST_F(Export, Tables) {
             "1700000000233333338,14,1233333338,contact_made,deepest_mm=0.5\n");
 }
 
+// A recording may hold any name.
+TEST_F(Export, TablesQuoteWhatWouldEndAField) {
+  mcap::FileSink sink(file_, true);
+  RecordingWriter writer(sink, {.program = "test"});
+  writer.add(sample_frame(10));
+  v1::Event event;
+  event.set_wall_ns(kWall);
+  event.set_sequence(7);
+  event.mutable_calibration()->set_name("a,\"b\"\nc");
+  writer.add(event);
+  writer.finish();
+  ASSERT_EQ(run({"--to", "csv"}), 0) << said_;
+  EXPECT_THAT(read("events.csv"), HasSubstr(",7,0,calibration,\"a,\"\"b\"\"\nc\"\n"));
+}
+
 // An earlier export may be longer and in another format. Files that no export wrote stay.
 TEST_F(Export, ForceReplacesAnEarlierExport) {
   ASSERT_EQ(run({"--to", "png"}), 0) << said_;

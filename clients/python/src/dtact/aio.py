@@ -199,6 +199,9 @@ class Client(Session):
     async def activate_calibration(self, number: int) -> None:
         await self._ask(requests.activate_calibration(number))
 
+    async def pin_calibration(self, number: int, pinned: bool = True) -> None:
+        await self._ask(requests.pin_calibration(number, pinned))
+
     async def reference(self) -> ReferenceImage:
         return await self._ask(requests.reference())
 

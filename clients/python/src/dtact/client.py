@@ -136,6 +136,11 @@ class Client(Session):
         """Makes one of calibrations() current."""
         self._ask(requests.activate_calibration(number))
 
+    def pin_calibration(self, number: int, pinned: bool = True) -> None:
+        """A pinned calibration is not removed, whatever is uploaded later. Others go once ten have been
+        in use since."""
+        self._ask(requests.pin_calibration(number, pinned))
+
     def reference(self) -> ReferenceImage:
         """The reference image that depth is measured against at present."""
         return self._ask(requests.reference())

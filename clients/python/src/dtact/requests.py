@@ -142,6 +142,13 @@ def activate_calibration(number: int) -> Request[None]:
     return Request(message, _nothing, slow=True)
 
 
+def pin_calibration(number: int, pinned: bool) -> Request[None]:
+    message = ClientMessage()
+    message.pin_calibration.number = number
+    message.pin_calibration.pinned = pinned
+    return Request(message, _nothing)
+
+
 def reference() -> Request[ReferenceImage]:
     message = ClientMessage()
     message.get_reference.SetInParent()

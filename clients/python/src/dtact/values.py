@@ -114,11 +114,13 @@ class StoredCalibration:
     in_use: bool
     summary: CalibrationSummary | None
     damage: str  #: why it cannot be read, or empty
+    pinned: bool  #: the daemon does not remove it
 
     @classmethod
     def of(cls, m: Message) -> StoredCalibration:
         summary = CalibrationSummary.of(m.summary) if m.HasField("summary") else None
-        return cls(m.number, m.name, m.uploaded, m.current, m.in_use, summary, m.damage)
+        return cls(m.number, m.name, m.uploaded, m.current, m.in_use, summary, m.damage,
+                   m.pinned)
 
 
 @dataclass(frozen=True)

@@ -3,6 +3,7 @@ import { create } from "@bufbuild/protobuf";
 import {
   ActivateCalibrationSchema,
   ListCalibrationsSchema,
+  PinCalibrationSchema,
   UploadCalibrationSchema,
 } from "../../gen/dtact_pb";
 import type { StoredCalibration } from "../../gen/dtact_pb";
@@ -44,7 +45,7 @@ export class CalibrationsPanel {
   }
 
   async refresh(): Promise<void> {
-    this.upload.hidden = !this.sensor.mayControl;
+    this.upload.hidden = !this.sensor.mayCalibrate;
     try {
       const result = await this.sensor.request({
         case: "listCalibrations",
@@ -82,10 +83,19 @@ export class CalibrationsPanel {
     if (stored.content.case === "damage")
       item.append(el("span", { class: "trouble" }, stored.content.value));
     if (stored.inUse) item.append(el("span", { class: "tag" }, "in use"));
-    else if (this.sensor.mayControl && stored.content.case === "summary") {
+    else if (this.sensor.mayCalibrate && stored.content.case === "summary") {
       item.append(
         button("Use", () => void this.activate(stored.number), {
           "aria-label": `Use calibration ${title}`,
+        }),
+      );
+    }
+    if (stored.pinned) item.append(el("span", { class: "tag" }, "pinned"));
+    if (this.sensor.mayCalibrate && !configured) {
+      item.append(
+        button(stored.pinned ? "Unpin" : "Pin", () => void this.pin(stored), {
+          title: "A pinned calibration stays, whatever is uploaded later",
+          "aria-label": `${stored.pinned ? "Unpin" : "Pin"} calibration ${title}`,
         }),
       );
     }
@@ -101,6 +111,15 @@ export class CalibrationsPanel {
     );
   }
 
+  private async pin(stored: StoredCalibration): Promise<void> {
+    await this.change("Writing.", () =>
+      this.sensor.request({
+        case: "pinCalibration",
+        value: create(PinCalibrationSchema, { number: stored.number, pinned: !stored.pinned }),
+      }),
+    );
+  }
+
   private async send(): Promise<void> {
     const files = [...(this.picker.files ?? [])];
     const [toml, png] = FILES.map((name) => files.find((file) => file.name === name));
@@ -112,12 +131,16 @@ export class CalibrationsPanel {
       [toml, png].map(async (file) => new Uint8Array(await file.arrayBuffer())),
     );
     if (!calibrationToml || !referencePng) return;
-    await this.change("Uploading.", () =>
-      this.sensor.request({
+    let removed = "";
+    await this.change("Uploading.", async () => {
+      const result = await this.sensor.request({
         case: "uploadCalibration",
         value: create(UploadCalibrationSchema, { name, calibrationToml, referencePng }),
-      }),
-    );
+      });
+      if (result.case !== "done") return;
+      removed = result.value.removed.map((old) => `${old.number} ${old.name}`).join(", ");
+    });
+    if (removed) this.tell(`The daemon removed ${removed}: it keeps the ten used last and pinned ones.`);
   }
 
   private async change(doing: string, ask: () => Promise<unknown>): Promise<void> {

@@ -64,6 +64,10 @@ export class Sensor {
     return this.rights !== Rights.VIEW;
   }
 
+  get mayCalibrate(): boolean {
+    return this.mayControl && this.rights !== Rights.CONTROL;
+  }
+
   /** A WebSocket that the gateway has for this sensor, beside the page: a proxy may serve it below a path. */
   private address(what: string): string {
     const url = new URL(`sensors/${encodeURIComponent(this.name)}/${what}`, document.baseURI);

@@ -1,0 +1,35 @@
+#pragma once
+
+#include <string>
+
+#include "daemon/serve/net_config.hpp"
+
+namespace dtact::v1 {
+class ClientMessage;
+}
+
+namespace dtact::net {
+
+class Session;
+
+/// `text` without control characters, for the log.
+[[nodiscard]] std::string printable(std::string text);
+
+/// What the log says of a request that changes something, all but its result.
+struct ChangeRecord {
+  /// "192.168.1.7:40312 (dtactctl 0.1.0, token arm): set_light brightness 128"; empty for a request
+  /// that changes nothing.
+  std::string text;
+  std::string client = {};  ///< As in LogLine.
+  std::string token = {};   ///< As in LogLine.
+};
+
+/// Names the client, the one that it relays the request of, the request and its values, which need
+/// not be valid.
+[[nodiscard]] ChangeRecord describe_change(const Session& session,
+                                           const v1::ClientMessage& message);
+
+/// Logs the change with its result, "done" or the sentence that says why not.
+void log_change(const Log& log, const ChangeRecord& change, const std::string& result);
+
+}  // namespace dtact::net
