@@ -35,7 +35,7 @@ class Reader {
   Reader& operator=(const Reader&) = delete;
 
   /// Empty when the file is whole; else where it ends or is damaged, and what the latest read()
-  /// could not read: so many chunks and messages, the first with its reason.
+  /// could not read: the number of chunks and messages, the first with its reason.
   [[nodiscard]] std::string damage() const;
   /// To be called in read() for a message that its reader cannot use; damage() then counts it.
   void count_unreadable(const std::string& why) const;

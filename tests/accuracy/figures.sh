@@ -22,7 +22,7 @@ evaluate sensor_a
 evaluate sensor_b
 evaluate sensor_c
 
-# imported SENSOR: the whole way of a user who has such a folder.
+# imported SENSOR: every step of a user who has a folder in that format.
 imported() {
   local images=../shared/data/$1
   [[ -d $images ]] || return 0

@@ -23,13 +23,13 @@ struct ImportPictures {
 /// single sensors below this one.
 [[nodiscard]] ImportPictures find_pictures(const std::filesystem::path& folder);
 
-/// A number of the board, the ball or the camera, and who says it.
+/// A number of the board, the ball or the camera, and its source.
 struct Stated {
   double value = 0;
   std::string by;  ///< "usual", "--pitch-mm", "FILE:12"
 };
 
-/// What such a calibration was made with.
+/// The settings with which the imported calibration was made.
 struct ImportSettings {
   Stated rows{7, "usual"};
   Stated cols{9, "usual"};

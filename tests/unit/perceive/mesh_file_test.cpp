@@ -72,8 +72,7 @@ TEST(MeshFile, FurtherPropertiesAndElementsArePassedOver) {
   EXPECT_DOUBLE_EQ(volume_of(parse_mesh(text, "object")), 64);
 }
 
-/// Three different boxes' worth of triangles would hide which solid was left out: each corner
-/// tells.
+/// The corners show which solid was left out; its triangles alone would not.
 TEST(MeshFile, AllSolidsOfATextStlAreRead) {
   const auto solid = [](const std::string& name, const std::string& corner) {
     return "solid " + name + "\n facet normal 0 0 1\n  outer loop\n   vertex 0 0 0\n   vertex " +
