@@ -144,8 +144,8 @@ Upgrade Server::upgrade(const Request& request, const net::Peer& peer) {
                                "there is no such sensor: GET /sensors lists those there are")};
   }
   return {.max_message = wire::kMaxMessage + wire::kLengthSize,
-          .open = [sensor](std::shared_ptr<WebSocket> socket, net::Peer peer) {
-            sensor->admit(std::move(socket), std::move(peer));
+          .open = [sensor](std::shared_ptr<WebSocket> socket, net::Peer from) {
+            sensor->admit(std::move(socket), std::move(from));
           }};
 }
 
