@@ -26,6 +26,7 @@ FILES = {
         /usr/lib/udev/rules.d/60-dtactd.rules
         /usr/share/doc/dtactd/examples/boards/raspberry-pi-5-usb-pio.toml
         /usr/share/doc/dtactd/examples/boards/try-board.sh
+        /usr/share/doc/dtactd/examples/devices.conf
         /usr/share/doc/dtactd/examples/grafana/dtactd.json
         /usr/share/doc/dtactd/examples/network.conf
         /usr/share/dtactd/scenes/calibration_presses.toml

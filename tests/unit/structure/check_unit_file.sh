@@ -72,4 +72,9 @@ for unit in dtactd.service dtactd@.service; do
   fi
   [[ -z $complaint ]] || fail "$complaint"
 done
+cp "$source/devices.conf" "$folder/dtactd@.service.d"
+complaint=$(verify dtactd@.service)
+[[ -z $complaint ]] || grep -vE "Unknown key '(RestartSteps|RestartMaxDelaySec)'" <<<"$complaint" ||
+  complaint=
+[[ -z $complaint ]] || fail "devices.conf: $complaint"
 echo "clean"
