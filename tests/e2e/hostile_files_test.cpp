@@ -32,8 +32,7 @@ std::string with_value(std::string text, const std::string& key, const std::stri
 }
 
 /// The sensor's own calibration with this reference and the digest of it.
-v1::UploadCalibration upload_with(client::Client& client, const std::string& png) {
-  const v1::CalibrationFiles files = client.calibration();
+v1::UploadCalibration upload_with(const v1::CalibrationFiles& files, const std::string& png) {
   v1::UploadCalibration upload;
   upload.set_name("hostile");
   upload.set_reference_png(png);
@@ -60,6 +59,10 @@ class HostileFiles : public testing::Test {
     begin_ = Clock::now();
   }
 
+  /// The calibration that the daemon uses.
+  [[nodiscard]] static v1::CalibrationFiles own() {
+    return daemon->sensor().connect("hostile").calibration();
+  }
   /// The sentence with which the daemon refuses; empty when it accepts.
   [[nodiscard]] std::string refusal(const v1::UploadCalibration& upload) const {
     client::Client client = daemon->sensor().connect("hostile");
@@ -84,27 +87,28 @@ class HostileFiles : public testing::Test {
 Besieged* HostileFiles::daemon = nullptr;
 
 TEST_F(HostileFiles, TextChunksAreNotRead) {
-  client::Client client = daemon->sensor().connect("hostile");
-  const std::string png =
-      fakes::with_text_chunks(client.calibration().reference_png(), 400, 7'900'000);
-  EXPECT_EQ(refusal(upload_with(client, png)), "");
-  const auto begin = Clock::now();
-  EXPECT_EQ(client.calibrations().size(), 2U);
-  const double listed_s = seconds_since(begin);
-  client.activate_calibration(0);
+  const v1::CalibrationFiles files = own();
+  const std::string png = fakes::with_text_chunks(files.reference_png(), 400, 7'900'000);
+  EXPECT_EQ(refusal(upload_with(files, png)), "");
+  double listed_s = 0;
+  {
+    client::Client client = daemon->sensor().connect("hostile");
+    const auto begin = Clock::now();
+    EXPECT_EQ(client.calibrations().size(), 2U);
+    listed_s = seconds_since(begin);
+    client.activate_calibration(0);
+  }
   end(fmt::format("a reference with 400 text chunks, {} bytes, listed in {:.3f} s", png.size(),
                   listed_s));
 }
 
 TEST_F(HostileFiles, APictureOfAnotherSizeIsNotDecoded) {
-  client::Client client = daemon->sensor().connect("hostile");
-  EXPECT_THAT(refusal(upload_with(client, fakes::grey16_png(8192, 8192))), HasSubstr("8192x8192"));
+  EXPECT_THAT(refusal(upload_with(own(), fakes::grey16_png(8192, 8192))), HasSubstr("8192x8192"));
   end("a reference of 8192x8192 pixels");
 }
 
 TEST_F(HostileFiles, AFrameOfAnotherSizeIsNotDecoded) {
-  client::Client client = daemon->sensor().connect("hostile");
-  v1::UploadCalibration upload = upload_with(client, fakes::grey16_png(8192, 8192));
+  v1::UploadCalibration upload = upload_with(own(), fakes::grey16_png(8192, 8192));
   std::string& toml = *upload.mutable_calibration_toml();
   const std::size_t frame = toml.find("[frame]");
   toml = toml.substr(0, frame) +
