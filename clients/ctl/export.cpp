@@ -294,8 +294,8 @@ void run_export(const cli::Context& context, const ExportOptions& options) {
   context.out << fmt::format("{}: {} frames, {} depth maps\n", report.output(), report.frames(),
                              report.maps());
   if (!report.damage().empty()) {
-    context.out << fmt::format("not all of the recording could be read ({}): all the rest is exported\n",
-                               report.damage());
+    context.out << fmt::format(
+        "not all of the recording could be read ({}): all the rest is exported\n", report.damage());
   }
 }
 

@@ -21,8 +21,8 @@ namespace {
 
 namespace asio = boost::asio;
 
-/// Requests to read or pin calibrations, or to read references, that may wait at the same time: half of what the
-/// pipeline takes, so that commands have room beside them.
+/// Requests to read or pin calibrations, or to read references, that may wait at the same time:
+/// half of what the pipeline takes, so that commands have room beside them.
 constexpr int kMaxReading = 8;
 
 constexpr const char* kChanging =

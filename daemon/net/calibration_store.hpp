@@ -95,7 +95,7 @@ class CalibrationStore {
 ///     STATE/calibrations/2/ball/…                                 the current one
 ///     STATE/calibration → calibrations/2/ball
 ///     STATE/calibration.starts                                    while a start is under way
-///     STATE/calibrations/recent                                   the numbers in the order of their use
+///     STATE/calibrations/recent                                   the numbers by last use
 ///     STATE/calibrations/1/pinned                                 an empty file
 ///
 /// Without the link the configured folder is current. A number's folder is written and synced as a

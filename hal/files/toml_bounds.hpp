@@ -23,8 +23,8 @@ struct Counts {
 };
 
 /// Walks through the text without memory of its own and throws std::runtime_error "WHERE:LINE: what
-/// is wrong" before a parser sees text beyond a limit or with control characters. Other text that is
-/// no TOML may pass: the parser refuses it where it ends to be TOML.
+/// is wrong" before a parser sees text beyond a limit or with control characters. Other text that
+/// is no TOML may pass: the parser refuses it where it ends to be TOML.
 Counts check_bounds(std::string_view text, const std::string& where);
 
 }  // namespace dtact::tomlfile

@@ -249,8 +249,8 @@ void run(const cli::Context& context, const Options& options) {
         reprocessor.unsharpened(), options.calibration);
   }
   if (!report.damage().empty()) {
-    context.out << fmt::format("not all of the recording could be read ({}): all the rest is in it\n",
-                               report.damage());
+    context.out << fmt::format(
+        "not all of the recording could be read ({}): all the rest is in it\n", report.damage());
   }
 }
 

@@ -37,7 +37,8 @@ class FoxgloveClient : public SensorTopics::Listener,
   static constexpr double kMaxRequestsPerS = 100;
 
   /// `ended` is called once, with the reason; nothing more comes of this client then.
-  /// `identity`: what the daemon's log calls it. `program`: the server's name that the client receives.
+  /// `identity`: what the daemon's log calls it. `program`: the server's name that the client
+  /// receives.
   FoxgloveClient(std::shared_ptr<WebSocket> socket, std::vector<Mount> mounts,
                  net::Tokens::Grant grant, std::string identity, std::string program,
                  std::function<void(const std::string&)> ended);
