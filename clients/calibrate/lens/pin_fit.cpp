@@ -42,7 +42,11 @@ PinFit::PinFit(const cv::Mat1f& image, double pitch_mm, double mm_per_px)
     for (int t = 0; t < kTerms; ++t) design(i, t) = weight * terms[t];
     weights_[i++] = weight;
   }
-  solver_ = design.completeOrthogonalDecomposition().pseudoInverse();
+  // The pseudoinverse from the thin QR decomposition: the disc has far more than ten points, so the
+  // columns are independent. pseudoInverse() makes a square matrix over all points instead.
+  const Eigen::HouseholderQR<Eigen::MatrixXd> qr(design);
+  const Eigen::MatrixXd thin_q = qr.householderQ() * Eigen::MatrixXd::Identity(count, kTerms);
+  solver_ = qr.matrixQR().topRows(kTerms).triangularView<Eigen::Upper>().solve(thin_q.transpose());
 }
 
 double PinFit::height_noise(double pixel_noise) const {

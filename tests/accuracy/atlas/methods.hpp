@@ -17,5 +17,7 @@ struct Method {
 
 /// The table's methods, each calibrated once.
 [[nodiscard]] const std::vector<Method>& methods();
+/// "sphere alone, one press" as methods() has it, without calibrating the others.
+[[nodiscard]] const Method& alone_single();
 
 }  // namespace dtact::atlas

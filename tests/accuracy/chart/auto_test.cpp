@@ -42,11 +42,21 @@ calibration::Calibration from_one_press(const image::Grey16& reference) {
                              .crop = calibration::Crop{kCropCol, kCropRow, kSide, kSide}});
 }
 
+/// The scripted run under one bound of the error.
+struct BoundedRun {
+  double bound_um;
+  pipeline::ResolutionChooser chooser{bound_um};
+  std::size_t chosen = 0;
+  std::vector<Judged> frames;
+};
+
 /// All objects one after the other (config/scenes/all_objects.toml), processed like in the capture
-/// loop: each frame chooses the resolution of the next.
-std::vector<Judged> scripted_run(const pipeline::ReconstructionRules& rules,
-                                 const image::Grey16& reference,
-                                 const calibration::Calibration& made) {
+/// loop: each frame chooses the resolution of the next. The maps at each resolution do not depend
+/// on the bound, so each is made once for all bounds.
+std::vector<BoundedRun> scripted_runs(const std::vector<double>& bounds_um,
+                                      const pipeline::ReconstructionRules& rules,
+                                      const image::Grey16& reference,
+                                      const calibration::Calibration& made) {
   const auto calibration = std::make_shared<const calibration::Calibration>(made);
   hal::CameraInfo camera;
   camera.width = kWidth;
@@ -57,20 +67,22 @@ std::vector<Judged> scripted_run(const pipeline::ReconstructionRules& rules,
   cells.set_reference(reference.pixels);
   pipeline::Resolutions& maps = active->maps;
   maps.set_reference(reference.pixels);
-  pipeline::ResolutionChooser chooser(rules.max_error_um);
+  std::vector<BoundedRun> runs;
+  for (const double bound_um : bounds_um) {
+    runs.push_back(
+        BoundedRun{.bound_um = bound_um, .chosen = maps.resolution_index(), .frames = {}});
+  }
 
   const hal::sim::Scene scene =
       hal::sim::load_scene(DTACT_SOURCE_DIR "/config/scenes/all_objects.toml");
   hal::sim::Renderer renderer(scene, 11);
   std::vector<std::uint8_t> luma(std::size_t{kWidth} * kHeight + recon::kLumaPadding);
   std::vector<std::int16_t> depth;
-  std::vector<Judged> run;
   for (std::uint64_t sequence = 0; sequence < 1920; sequence += 6) {
     renderer.render(sequence, hal::sim::led_levels(hal::Light{}), luma.data(), kWidth, kHeight);
     (void)cells.look({luma.data(), kWidth, kHeight, kWidth});
     const Shot shot = truth_of(renderer, sequence);
     Judged judged;
-    judged.chosen = maps.resolution_index();
     for (std::size_t resolution_index = 0; resolution_index < maps.resolutions().size();
          ++resolution_index) {
       maps.use(resolution_index);
@@ -93,20 +105,24 @@ std::vector<Judged> scripted_run(const pipeline::ReconstructionRules& rules,
               maps.lut_um(0.0005 * std::max<int>(0, std::ranges::max(depth)), resolution.steps()),
           .error_um = 1000 * error_of(depth, resolution.decimation(), shot).mean_absolute_mm};
     }
-    const Made& seen = judged.by_resolution.at(judged.chosen);
-    const double plain_um =
-        pipeline::plain_bend_um(seen.bend_um, maps.resolutions()[judged.chosen].steps());
-    std::vector<double> expected;
-    for (const pipeline::Resolution& each : maps.resolutions()) {
-      expected.push_back(
-          pipeline::uncertainty_at_um(judged.by_resolution.at(expected.size()).lut_um, plain_um,
-                                      each.decimation(), each.steps()));
+    const bool counts =
+        std::ranges::count_if(shot.judged, [](std::uint8_t c) { return c != 0; }) >= 300;
+    for (BoundedRun& run : runs) {
+      judged.chosen = run.chosen;
+      const Made& seen = judged.by_resolution.at(judged.chosen);
+      const double plain_um =
+          pipeline::plain_bend_um(seen.bend_um, maps.resolutions()[judged.chosen].steps());
+      std::vector<double> expected;
+      for (const pipeline::Resolution& each : maps.resolutions()) {
+        expected.push_back(
+            pipeline::uncertainty_at_um(judged.by_resolution.at(expected.size()).lut_um, plain_um,
+                                        each.decimation(), each.steps()));
+      }
+      run.chosen = run.chooser.next(expected);
+      if (counts) run.frames.push_back(judged);
     }
-    maps.use(chooser.next(expected));
-    if (std::ranges::count_if(shot.judged, [](std::uint8_t c) { return c != 0; }) < 300) continue;
-    run.push_back(judged);
   }
-  return run;
+  return runs;
 }
 
 template <typename Predicate>
@@ -134,9 +150,10 @@ void print_shares(const char* what, double bound_um, const std::vector<Judged>& 
 TEST(Auto, KeepsTheBoundWhereverFullResolutionDoesAndSavesPixels) {
   const image::Grey16 reference = make_reference();
   const calibration::Calibration calibration = from_one_press(reference);
-  for (const double bound : {60.0, 100.0, 150.0, 250.0}) {
-    const std::vector<Judged> run =
-        scripted_run({.decimation = 0, .max_error_um = bound}, reference, calibration);
+  for (const BoundedRun& each :
+       scripted_runs({60, 100, 150, 250}, {.decimation = 0}, reference, calibration)) {
+    const double bound = each.bound_um;
+    const std::vector<Judged>& run = each.frames;
     ASSERT_GT(run.size(), 150U);
     constexpr std::size_t kFull = 2;
     const double full_inside =
@@ -164,12 +181,11 @@ TEST(Auto, SharpensWhereTheBoundAsksForItAndNotElsewhere) {
   calibration::Calibration calibration = from_one_press(reference);
   calibration.model = std::make_shared<const recon::Model>(
       with_luts_of_virtual_balls(*calibration.model, reference));
-  for (const double bound : {30.0, 60.0, 120.0}) {
-    const std::vector<Judged> run =
-        scripted_run({.decimation = 0,
-                      .sharpen = pipeline::ReconstructionRules::kAutoSharpen,
-                      .max_error_um = bound},
-                     reference, calibration);
+  for (const BoundedRun& each : scripted_runs(
+           {30, 60, 120}, {.decimation = 0, .sharpen = pipeline::ReconstructionRules::kAutoSharpen},
+           reference, calibration)) {
+    const double bound = each.bound_um;
+    const std::vector<Judged>& run = each.frames;
     ASSERT_GT(run.size(), 150U);
     print_shares("sharpening", bound, run, 3);
     if (bound == 30.0) {

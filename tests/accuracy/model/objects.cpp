@@ -48,16 +48,17 @@ std::uint64_t held(const hal::sim::Scene& scene, const hal::sim::Press& press) {
 }
 
 void judge(std::uint64_t seed, const hal::sim::Scene& undeformed,
-           const std::shared_ptr<const hal::sim::Truth>& objects,
+           const std::shared_ptr<const hal::sim::Truth>& objects, const table::Protocol& protocol,
            std::vector<ObjectErrors>& errors) {
   const table::Configuration& light = table::configurations()[0];
-  const table::Trial trial = table::draw(seed, {.test_presses = 0});
+  const table::Trial trial = table::draw(seed, protocol);
   table::Sensor sensor(table::solve(undeformed, trial.all()), light, seed);
   const table::Material material = table::gather(sensor, trial, light.regression_centre);
   table::Sensor tested(objects, light, seed + 1000);
   const auto& presses = objects->scene().presses;
   for (std::size_t m = 0; m < errors.size(); ++m) {
     const table::Method& method = table::methods()[m];
+    if (method.of_many && trial.many.empty()) continue;
     std::shared_ptr<const recon::Model> model;
     try {
       model = method.calibrate(material);
@@ -92,14 +93,14 @@ std::vector<std::string> object_names() {
   return names;
 }
 
-std::vector<ObjectErrors> read_objects(int seeds, table::Law law) {
+std::vector<ObjectErrors> read_objects(int seeds, table::Law law, const table::Protocol& protocol) {
   const auto objects = std::make_shared<const hal::sim::Truth>(all_objects(law));
   const hal::sim::Scene undeformed =
       law == table::Law::built_in ? hal::sim::default_scene() : table::another_law();
   std::vector<ObjectErrors> errors(table::methods().size());
   for (ObjectErrors& each : errors) each.in_contact_mm.resize(objects->scene().presses.size());
   for (int seed = 1; seed <= seeds; ++seed) {
-    judge(static_cast<std::uint64_t>(seed), undeformed, objects, errors);
+    judge(static_cast<std::uint64_t>(seed), undeformed, objects, protocol, errors);
   }
   return errors;
 }

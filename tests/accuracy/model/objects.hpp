@@ -23,9 +23,12 @@ struct ObjectErrors {
 /// The objects of config/scenes/all_objects.toml, in the order in which they are held.
 [[nodiscard]] std::vector<std::string> object_names();
 /// Calibrates every method of the paper's table for each of the seeds 1 … `seeds`, like the table,
-/// on a sensor of the law, and measures objects.
+/// on a sensor of the law, and measures objects. Without calibration presses it calibrates only the
+/// methods of one press; the errors of the others stay empty.
 [[nodiscard]] std::vector<ObjectErrors> read_objects(int seeds,
-                                                     table::Law law = table::Law::built_in);
+                                                     table::Law law = table::Law::built_in,
+                                                     const table::Protocol& protocol = {
+                                                         .test_presses = 0});
 /// The table, Markdown; `sensor` names the sensor in a word or two.
 [[nodiscard]] std::string to_markdown(const std::vector<ObjectErrors>& errors, int seeds,
                                       const std::string& sensor);

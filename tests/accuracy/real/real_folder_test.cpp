@@ -4,6 +4,8 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
+#include <map>
+#include <utility>
 
 #include "hal/base/atomic_file.hpp"
 #include "tests/accuracy/real/folder_evaluation.hpp"
@@ -22,10 +24,18 @@ FolderEvaluation judged(const std::filesystem::path& folder) {
   return e;
 }
 
+/// A sensor's own folder, evaluated once for all tests.
+const FolderEvaluation& judged_once(const std::filesystem::path& folder) {
+  static std::map<std::filesystem::path, FolderEvaluation> all;
+  const auto found = all.find(folder);
+  if (found != all.end()) return found->second;
+  return all.emplace(folder, judged(folder)).first->second;
+}
+
 TEST(RealFolder, SensorA) {
   const auto folder = sensor_folder("sensor_a");
   if (!folder) GTEST_SKIP() << "the real images are not beside the repository";
-  const FolderEvaluation e = judged(*folder);
+  const FolderEvaluation& e = judged_once(*folder);
   ASSERT_TRUE(e.pins && e.ball && e.pin_depths);
   EXPECT_LE(rms(e.pins->lens.left_out), 0.06);
   EXPECT_LE(e.ball->half_mae_mm.value_or(1), 0.0095);
@@ -40,7 +50,7 @@ TEST(RealFolder, SensorA) {
 TEST(RealFolder, SensorBIsAHardPress) {
   const auto folder = sensor_folder("sensor_b");
   if (!folder) GTEST_SKIP() << "the real images are not beside the repository";
-  const FolderEvaluation e = judged(*folder);
+  const FolderEvaluation& e = judged_once(*folder);
   ASSERT_TRUE(e.pins && e.ball && e.pin_depths);
   EXPECT_LE(rms(e.pins->lens.left_out), 0.06);
   EXPECT_LE(e.ball->half_mae_mm.value_or(1), 0.04);
@@ -52,7 +62,7 @@ TEST(RealFolder, SensorBIsAHardPress) {
 TEST(RealFolder, SensorCSaysThatThereIsNoBall) {
   const auto folder = sensor_folder("sensor_c");
   if (!folder) GTEST_SKIP() << "the real images are not beside the repository";
-  const FolderEvaluation e = judged(*folder);
+  const FolderEvaluation& e = judged_once(*folder);
   ASSERT_TRUE(e.pins);
   EXPECT_LE(rms(e.pins->lens.left_out), 0.06);
   EXPECT_FALSE(e.ball || e.pin_depths);
@@ -87,7 +97,7 @@ TEST(RealFolder, APressThatIsNoneIsSaid) {
 TEST(RealFolder, ThePageIsWrittenWholeAndReplaced) {
   const auto folder = sensor_folder("sensor_c");
   if (!folder) GTEST_SKIP() << "the real images are not beside the repository";
-  const FolderEvaluation e = judged(*folder);
+  const FolderEvaluation& e = judged_once(*folder);
   const calibration::TempFolder temp;
   const std::filesystem::path page = temp.path() / "page";
   write_page(e, "a <sensor>", page);

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <memory>
 #include <numbers>
 #include <optional>
@@ -162,10 +163,20 @@ Calibration by_gel_of(const Calibration& other, const FolderEvaluation& e) {
   return made;
 }
 
-std::optional<FolderEvaluation> evaluated(const char* sensor) {
+/// A sensor's folder, and its calibration by the gel where the folder has a ball: made once for all
+/// tests.
+struct Evaluated : FolderEvaluation {
+  std::optional<Calibration> gel;
+};
+const Evaluated* evaluated(const char* sensor) {
+  static std::map<std::string, Evaluated> all;
   const auto folder = sensor_folder(sensor);
-  if (!folder) return std::nullopt;
-  return evaluate_folder(*folder, {}, 4.0);
+  if (!folder) return nullptr;
+  const auto found = all.find(sensor);
+  if (found != all.end()) return &found->second;
+  Evaluated e{evaluate_folder(*folder, {}, 4.0), std::nullopt};
+  if (e.calibration) e.gel = by_gel(e);
+  return &all.emplace(sensor, std::move(e)).first->second;
 }
 
 /// Each step makes pins narrower without a trough. `once` and `twice` limit how much more of their
@@ -186,30 +197,30 @@ void expect_steeper(const Pins& read) {
 }
 
 TEST(SharpPins, SensorA) {
-  const auto e = evaluated("sensor_a");
+  const Evaluated* e = evaluated("sensor_a");
   if (!e) GTEST_SKIP() << "the real images are not beside the repository";
-  ASSERT_TRUE(e->pins && e->calibration);
-  const Pins read = read_board("sensor_a", *e, by_gel(*e));
+  ASSERT_TRUE(e->pins && e->gel);
+  const Pins read = read_board("sensor_a", *e, *e->gel);
   expect_narrower(read, 0.005, 0.015);
   expect_steeper(read);
 }
 
 // The fit of its asymmetric press has light scattered 3.4 mm wide, which blurs no edge of a pin.
 TEST(SharpPins, SensorBIsHardlySteeper) {
-  const auto e = evaluated("sensor_b");
+  const Evaluated* e = evaluated("sensor_b");
   if (!e) GTEST_SKIP() << "the real images are not beside the repository";
-  ASSERT_TRUE(e->pins && e->calibration);
-  const Pins read = read_board("sensor_b", *e, by_gel(*e));
+  ASSERT_TRUE(e->pins && e->gel);
+  const Pins read = read_board("sensor_b", *e, *e->gel);
   expect_narrower(read, 0.005, 0.005);
   EXPECT_GT(read.mean[2].slope, read.mean[0].slope);
 }
 
 TEST(SharpPins, SensorCByTheGelOfSensorA) {
-  const auto a = evaluated("sensor_a");
-  const auto c = evaluated("sensor_c");
+  const Evaluated* a = evaluated("sensor_a");
+  const Evaluated* c = evaluated("sensor_c");
   if (!a || !c) GTEST_SKIP() << "the real images are not beside the repository";
-  ASSERT_TRUE(a->pins && a->calibration && c->pins);
-  const Pins read = read_board("sensor_c", *c, by_gel_of(by_gel(*a), *c));
+  ASSERT_TRUE(a->pins && a->gel && c->pins);
+  const Pins read = read_board("sensor_c", *c, by_gel_of(*a->gel, *c));
   expect_narrower(read, 0.005, 0.015);
   expect_steeper(read);
 }

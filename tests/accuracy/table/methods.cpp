@@ -62,11 +62,12 @@ std::shared_ptr<const recon::Model> published_regression(const Material& materia
 
 constexpr std::array<Method, 7> kMethods = {{
     {"published single image", published_single},
-    {"published regression", published_regression},
+    {"published regression", published_regression, 0, true},
     {"sphere alone, one press", alone_single},
-    {"sphere alone, many presses", [](const Material& material) { return alone_many(material); }},
+    {"sphere alone, many presses", [](const Material& material) { return alone_many(material); }, 0,
+     true},
     {"ours, one press", ours_single},
-    {"ours, many presses", ours_many},
+    {"ours, many presses", ours_many, 0, true},
     {"ours, gel model of one press, sharpened", gel_model, 2},
 }};
 

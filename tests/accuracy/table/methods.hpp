@@ -42,6 +42,7 @@ struct Method {
   std::string_view name;
   std::shared_ptr<const recon::Model> (*calibrate)(const Material& material) = nullptr;
   int sharpen_steps = 0;
+  bool of_many = false;  ///< Needs presses besides the one near the centre.
 };
 
 [[nodiscard]] std::span<const Method> methods();

@@ -92,6 +92,7 @@ std::vector<Cell> run_trial(const Trial& trial, std::size_t configuration_count,
     const Material material = gather(sensor, trial, configurations()[c].regression_centre);
     const auto tests = photograph(sensor, trial, crop8(material.reference_q8));
     for (std::size_t m = 0; m < methods().size(); ++m) {
+      if (methods()[m].of_many && trial.many.empty()) continue;
       std::shared_ptr<const recon::Model> model;
       try {
         model = methods()[m].calibrate(material);

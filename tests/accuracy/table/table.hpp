@@ -24,7 +24,7 @@ struct Cell {
 };
 
 /// Solves a trial's presses once and judges every method under the configurations
-/// [0, `configuration_count`).
+/// [0, `configuration_count`); in a trial without `many` only the methods of one press.
 [[nodiscard]] std::vector<Cell> run_trial(const Trial& trial, std::size_t configuration_count,
                                           Law law = Law::built_in);
 

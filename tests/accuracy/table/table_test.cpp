@@ -15,7 +15,8 @@
 namespace dtact::table {
 namespace {
 
-// A short form of the table: the first configuration, six seeds, fewer presses.
+// A short form of the table: the first configuration, six seeds, fewer presses. What is compared
+// are methods of one press: those of many are calibrated for the first seed alone.
 const std::vector<Cell>& cells() {
   static const std::vector<Cell> all = [] {
     Protocol protocol;
@@ -23,7 +24,9 @@ const std::vector<Cell>& cells() {
     protocol.test_presses = 8;
     std::vector<Cell> cells;
     for (std::uint64_t seed = 1; seed <= 6; ++seed) {
-      const auto some = run_trial(draw(seed, protocol), 1);
+      Trial trial = draw(seed, protocol);
+      if (seed > 1) trial.many.clear();
+      const auto some = run_trial(trial, 1);
       cells.insert(cells.end(), some.begin(), some.end());
     }
     return cells;
@@ -70,7 +73,7 @@ TEST(Table, OursIsFarBetterByTheTrueIndentation) {
 TEST(Table, AnotherLawHasARowOfItsOwn) {
   std::vector<Cell> both = cells();
   const auto other =
-      run_trial(draw(1, {.calibration_presses = 10, .test_presses = 2}), 1, Law::another);
+      run_trial(draw(1, {.calibration_presses = 0, .test_presses = 2}), 1, Law::another);
   both.insert(both.end(), other.begin(), other.end());
   EXPECT_NE(to_csv(both).find(",another\n"), std::string::npos);
   const std::string table = to_markdown(both);

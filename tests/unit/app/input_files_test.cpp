@@ -67,11 +67,12 @@ TEST(InputFiles, ARecordingsFirstFrameIsDecoded) {
   camera.backend = "replay";
   camera.replay.folder = folder;
   EXPECT_EQ(error([&] { check_camera_files(camera); }), "no error");
-  EXPECT_THAT(error([&] { check_camera(camera); }), StartsWith((folder / "1.jpg").string() + ": "));
+  EXPECT_THAT(error([&] { app::check_camera(camera); }),
+              StartsWith((folder / "1.jpg").string() + ": "));
   std::filesystem::remove_all(folder);
   camera.backend = "sim";
   camera.sim.scene = folder;
-  EXPECT_THAT(error([&] { check_camera(camera); }), StartsWith("camera.sim.scene = "));
+  EXPECT_THAT(error([&] { app::check_camera(camera); }), StartsWith("camera.sim.scene = "));
 }
 
 // A real camera must never show depth by the simulated sensor's calibration.

@@ -120,8 +120,8 @@ TEST(ChessboardLens, AStraightPictureNeedsNoRadialTerm) {
 TEST(ChessboardLens, NamesTheImageWithoutABoard) {
   BoardCamera away = flat();
   away.shift_mm = {14, 0};  // half outside
-  const std::vector<cv::Mat1b> images{photograph(flat()), photograph(away), photograph(flat()),
-                                      photograph(flat())};
+  const cv::Mat1b whole = photograph(flat());
+  const std::vector<cv::Mat1b> images{whole, photograph(away), whole, whole};
   EXPECT_THAT(
       [&] { (void)calibrate_chessboards(images, {"a.png", "b.png", "c.png", "d.png"}, kBoard); },
       ThrowsMessage<std::runtime_error>(
