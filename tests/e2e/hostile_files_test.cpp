@@ -137,7 +137,7 @@ TEST_F(HostileFiles, AFileIsOnlySoWide) {
                                   fakes::wide_toml(4'000'000), fakes::many_keys_toml(4'000'000),
                                   fakes::wide_toml(520'000), fakes::many_keys_toml(300'000)}) {
     upload.set_calibration_toml(toml);
-    EXPECT_THAT(refusal(upload), HasSubstr(":1: "));
+    EXPECT_THAT(refusal(upload), HasSubstr("upload wide:"));
   }
   end("uploads of 15.9 MB");
 }
