@@ -50,7 +50,7 @@ struct SetupOptions {
   std::string crop;
 };
 
-/// Runs a program on this terminal. Returns its exit status, 127 when it is not there.
+/// Runs a program on this terminal. Returns its exit status. Throws when it is not there.
 int run_program(const Command& command, std::ostream& out) {
   out << "$ " << fmt::format("{}", fmt::join(command, " ")) << std::endl;
   std::vector<char*> arguments;

@@ -57,17 +57,6 @@ Answer refusal_of(const net::Admission::Verdict& verdict) {
   return answer;
 }
 
-Answer refusal_of(const net::Admission::Verdict& verdict) {
-  if (verdict.error_code != v1::ERROR_DENIED) {
-    return refusal(http::status::service_unavailable, verdict.sentence);
-  }
-  Answer answer =
-      refusal(http::status::unauthorized,
-              verdict.sentence + ": it belongs into the connection's address, ?token=…");
-  answer.delay = verdict.delay;
-  return answer;
-}
-
 }  // namespace
 
 Server::Server(asio::io_context& io, Settings settings, const Page& page)
