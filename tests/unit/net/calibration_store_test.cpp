@@ -212,7 +212,7 @@ TEST_F(Store, KeepsPinnedOnes) {
   EXPECT_EQ(store.list()[1].uploaded, uploaded);
   for (int i = 3; i <= 12; ++i) store.keep({"ball", std::to_string(i), "p"});
   EXPECT_THAT(numbers(store.list()), ElementsAre(0, 1, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12));
-  EXPECT_EQ(store.load(1)->name, "ball");
+  EXPECT_EQ(store.load(1, {})->name, "ball");
   store.pin(1, false);
   store.pin(1, false);
   EXPECT_THAT(numbers(store.keep({"ball", "13", "p"}).removed), ElementsAre(1, 3));

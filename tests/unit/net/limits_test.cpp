@@ -181,15 +181,16 @@ TEST(Admission, KeepsPlacesForThoseThatNeedNoToken) {
   Admission admission(config);
   const Peer other{"192.0.2.1:4711", "0.0.0.0:7377", "192.0.2.1", false};
   const Peer root{"pid 811 (uid 0)", "/run/dtactd/dtactd.sock", "uid 0 (needs no token)", true};
-  for (int i = 0; i < 3; ++i) EXPECT_EQ(admission.enter(other, "").rights, Rights::control);
+  for (int i = 0; i < 3; ++i)
+    EXPECT_EQ(admission.enter(other, "").grant->rights, Rights::calibrate);
   EXPECT_EQ(admission.enter(other, "").error_code, v1::ERROR_BUSY);
   for (std::size_t i = 0; i < Admission::kReserved; ++i) {
-    EXPECT_EQ(admission.enter(root, "").rights, Rights::control) << i;
+    EXPECT_EQ(admission.enter(root, "").grant->rights, Rights::calibrate) << i;
   }
   EXPECT_EQ(admission.enter(root, "").error_code, v1::ERROR_BUSY);
   admission.leave(root);
   EXPECT_EQ(admission.enter(other, "").error_code, v1::ERROR_BUSY);
-  EXPECT_EQ(admission.enter(root, "").rights, Rights::control);
+  EXPECT_EQ(admission.enter(root, "").grant->rights, Rights::calibrate);
 }
 
 TEST(Requests, TooManyASecondAreAFlood) {
@@ -376,7 +377,7 @@ TEST(Unread, LargeAnswersThatNobodyReadsAreBounded) {
   Rig rig;
   const CalibrationFiles large{
       .name = "large", .toml = "toml", .png = std::string(15U << 20U, 'x')};
-  const std::uint64_t number = rig.store.keep(large);
+  const std::uint64_t number = rig.store.keep(large).number;
   v1::ClientMessage ask;
   ask.mutable_get_calibration()->set_number(number);
   std::vector<std::unique_ptr<RawClient>> silent;
@@ -416,7 +417,8 @@ TEST(WrongTokens, AreAnsweredLaterAndLater) {
   EXPECT_EQ(admission.enter(other, "guess").delay, 500ms);
   EXPECT_EQ(admission.enter(guesser, "").delay, 500ms) << "none is no guess";
   // A client that shares the address with a guesser is served at once.
-  EXPECT_EQ(admission.enter(guesser, "0123456789abcdef0123456789abcdef").rights, Rights::control);
+  EXPECT_EQ(admission.enter(guesser, "0123456789abcdef0123456789abcdef").grant->rights,
+            Rights::control);
 }
 
 TEST(Answers, AboveTheCapAreErrorsAndTheConnectionStays) {
