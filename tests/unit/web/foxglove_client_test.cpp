@@ -90,9 +90,9 @@ TEST(FoxgloveClient, WithdrawsItsAlertWhenTheDaemonIsBack) {
   const auto socket = std::make_shared<SlowSocket>(io);
   const auto sensor =
       std::make_shared<SensorTopics>(std::make_shared<Source>(io, "left", client::Options{}));
-  const auto client =
-      std::make_shared<FoxgloveClient>(socket, std::vector<Mount>{{sensor, "", {}}},
-                                       net::Rights::view, "test", [](const std::string&) {});
+  const auto client = std::make_shared<FoxgloveClient>(socket, std::vector<Mount>{{sensor, "", {}}},
+                                                       net::Tokens::Grant{}, "viewer", "test",
+                                                       [](const std::string&) {});
   client->start();
   while (socket->finish_write()) {
   }
