@@ -104,13 +104,15 @@ void set_up(CLI::App& app, cli::Context& context) {
     daemons->excludes(one);
   }
   cli::add_listen_options(app, net);
+  CLI::CheckedTransformer rights(
+      std::map<std::string, net::Rights>{{"view", net::Rights::view},
+                                         {"control", net::Rights::control},
+                                         {"calibrate", net::Rights::calibrate}});
+  rights.description("");  // the type's name says them
   app.add_option("--anonymous-rights", arguments->anonymous_rights,
                  "What viewers may do where there are no --tokens; by default calibrate for "
                  "viewers on this machine, view where --listen reaches beyond it")
-      ->transform(CLI::CheckedTransformer(
-          std::map<std::string, net::Rights>{{"view", net::Rights::view},
-                                             {"control", net::Rights::control},
-                                             {"calibrate", net::Rights::calibrate}}))
+      ->transform(rights)
       ->type_name("view|control|calibrate");
   app.add_option("--name", arguments->settings.host_names,
                  "A name by which browsers may reach this machine, besides its own and its "

@@ -116,7 +116,7 @@ TEST(TomlBounds, FilesOfTheProjectAreFarFromThem) {
     if (entry.path().extension() != ".toml") continue;
     const std::string text = base::read_file(entry.path());
     EXPECT_EQ(refusal(text), "") << entry.path();
-    EXPECT_LT(text.size(), kMaxBytes / 50) << entry.path();
+    EXPECT_LT(text.size(), kMaxBytes / 20) << entry.path();
     ++files;
   }
   EXPECT_GT(files, 10);

@@ -55,7 +55,7 @@ TEST(Calibration, GoesUpAndComesBack) {
   EXPECT_EQ(base::read_file(copy + "/reference.png"), "png");
   EXPECT_EQ(base::read_file(copy + "/calibration.toml"), "version = 1\n");
   result = ctl(rig, {"calibration", "upload", folder.string(), "--name", "other", "--json"});
-  EXPECT_EQ(result.out, R"({"number":5,"name":"other","folder":""})"
+  EXPECT_EQ(result.out, R"({"number":5,"name":"other","folder":"","removed":[2]})"
                         "\n");
   result = ctl(rig, {"calibration", "upload", folder.string(), "--name", "no good"});
   EXPECT_EQ(result.code, 1);
@@ -70,7 +70,8 @@ TEST(Calibration, IsExportedOnceUnlessForced) {
   const std::string folder = (temporary / "factory").string();
   auto result = ctl(rig, {"calibration", "download", "configured", "-o", folder, "--json"});
   EXPECT_EQ(result.code, 0) << result.error;
-  EXPECT_EQ(result.out, R"({"number":0,"name":"factory","folder":")" + folder + "\"}\n");
+  EXPECT_EQ(result.out,
+            R"({"number":0,"name":"factory","folder":")" + folder + "\",\"removed\":[]}\n");
   result = ctl(rig, {"calibration", "download", "2", "-o", folder});
   EXPECT_EQ(result.code, 1);
   EXPECT_THAT(result.error, AllOf(HasSubstr(folder + " exists"), HasSubstr("--force")));
@@ -110,7 +111,7 @@ TEST(Calibration, IsListed) {
       StartsWith(R"({"number":0,"name":"factory","uploaded":"","current":false,"summary":{)"
                  R"("name":"factory","method":"lut","mm_per_px":0.0414,"width":580,"height":580,)"
                  R"("covered_from_mm":-0.02,"covered_to_mm":1.4,"created":"","frame_width":800,)"
-                 R"("frame_height":600,"sharpen_steps":[]},"in_use":false})"
+                 R"("frame_height":600,"sharpen_steps":[]},"in_use":false,"pinned":false})"
                  "\n"));
   EXPECT_THAT(json, HasSubstr(R"("name":"broken","uploaded":"2026-01-31T12:00:00Z",)"
                               R"("current":false,"damage":"calibration.toml:3: scale missing",)"));
@@ -153,7 +154,7 @@ TEST(Calibration, IsShownAndActivatedByItsId) {
   EXPECT_EQ(ctl(rig, {"calibration", "activate", "configured"}).out,
             "the daemon uses calibration configured from now on\n");
   EXPECT_EQ(ctl(rig, {"calibration", "activate", "1", "--json"}).out,
-            R"({"number":1,"name":"","folder":""})"
+            R"({"number":1,"name":"","folder":"","removed":[]})"
             "\n");
   const auto refused = ctl(rig, {"calibration", "activate", "2"});
   EXPECT_EQ(refused.code, 1);

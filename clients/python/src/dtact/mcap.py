@@ -63,7 +63,8 @@ def read(path: str | Path) -> Iterator[Frame | Event]:
         state = _State()
         any_read = False
         for opcode, body in _records(file, state):
-            for inner, part in _in_chunk(body, state) if opcode == _CHUNK else [(opcode, body)]:
+            whole = [(opcode, memoryview(body))]
+            for inner, part in _in_chunk(body, state) if opcode == _CHUNK else whole:
                 item = _taken(inner, part, state)
                 if item is not None:
                     any_read = True
