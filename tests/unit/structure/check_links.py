@@ -15,7 +15,7 @@ RULES = {
     "dtactd": (["core"], [], FITS),
     # OpenSSL it may: it speaks TLS to the daemon and makes certificates. libsystemd it may: it asks Avahi over
     # D-Bus. Highway it may: it writes point clouds.
-    "dtactctl": ([], ["tomlplusplus", "gpiod", "camera", "spdlog"],
+    "dtactctl": ([], ["gpiod", "camera", "spdlog"],
                  FITS + ["dtact::calibration::load", "dtact::recon::Reconstructor::run"]),
     "dtact-calibrate": (["core", "imgproc", "calib3d"],
                         ["systemd", "gpiod", "camera", "spdlog"], []),

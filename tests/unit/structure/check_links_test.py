@@ -20,7 +20,7 @@ class Links(unittest.TestCase):
         self.assertEqual(self.found("dtact-calibrate", ["libopencv_imgcodecs.so.406"]), 1)
 
     def test_libraries_of_the_other_programs_are_reported(self):
-        self.assertEqual(self.found("dtactctl", ["libtomlplusplus.so.3"]), 1)
+        self.assertEqual(self.found("dtactctl", ["libgpiod.so.2"]), 1)
         self.assertEqual(self.found("dtact-calibrate", ["libcamera.so.0.0.3"]), 1)
 
     def test_a_fit_is_reported(self):

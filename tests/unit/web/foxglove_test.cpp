@@ -50,7 +50,7 @@ TEST(FoxgloveProtocol, RequestAndResponseHaveSchemasOfTheirOwn) {
 TEST(FoxgloveProtocol, IdsAreAlikeForNoTwo) {
   EXPECT_EQ(channel_id(0, Topic::frame), 1U);
   EXPECT_EQ(channel_id(0, Topic::jpeg), 8U);
-  EXPECT_EQ(channel_id(1, Topic::frame), 10U);
+  EXPECT_EQ(channel_id(1, Topic::frame), 12U);
   EXPECT_EQ(service_id(0, Service::rezero), 2U);
   EXPECT_EQ(service_id(1, Service::set_light), 3U);
   for (std::size_t i = 0; i < kTopics; ++i) EXPECT_EQ(index(topics()[i].topic), i);
@@ -266,7 +266,7 @@ TEST(FoxgloveTopics, AreThoseThatTheDaemonServes) {
   Topics wanted;
   wanted.set(index(Topic::points));
   EXPECT_EQ(subscription_for(wanted).ShortDebugString(),
-            "summary: true decimation: 2 contact_box: true summary_hz: 60 cloud: CLOUD_FLOAT32 "
+            "summary: true summary_hz: 60 decimation: 2 contact_box: true cloud: CLOUD_FLOAT32 "
             "cloud_hz: 60");
   EXPECT_EQ(unadvertise({{1, "/left", wanted}}), R"({"op":"unadvertise","channelIds":[20]})");
   wanted.reset().set(index(Topic::transforms));
