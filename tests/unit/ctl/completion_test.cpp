@@ -62,7 +62,7 @@ std::set<std::string> options_of(Run run, std::vector<std::string> command) {
 
 TEST(Completion, OffersCommands) {
   EXPECT_THAT(complete("dtactctl re"), UnorderedElementsAre("rezero", "record", "reconstruction"));
-  EXPECT_THAT(complete("dtactctl --port 7 s"), UnorderedElementsAre("status", "snapshot", "setup"));
+  EXPECT_THAT(complete("dtactctl --port 7 s"), UnorderedElementsAre("status", "snapshot"));
   EXPECT_THAT(complete("dtactctl calibration \"\""),
               UnorderedElementsAre("upload", "list", "show", "activate", "download", "pin", "unpin",
                                    "--help"));

@@ -91,7 +91,7 @@ TEST_F(Zsh, OffersEveryCommandAndOption) {
   for (const auto& [line, words] : expected) lines.push_back(line);
   // dtactctl, its 14 commands, 5 of calibration; dtact-calibrate and its 7; dtact-perceive and its
   // 2; dtact-web; dtactd.
-  EXPECT_EQ(lines.size(), 1U + 14 + 5 + 2 + 1 + 7 + 1 + 1 + 2 + 1 + 1 + 1);
+  EXPECT_EQ(lines.size(), 1U + 15 + 7 + 2 + 1 + 8 + 1 + 1 + 2 + 1 + 1 + 1);
   for (const auto& [line, words] : offers(lines)) {
     EXPECT_THAT(expected.at(line), IsSubsetOf(words)) << line;
   }
