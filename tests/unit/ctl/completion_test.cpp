@@ -62,7 +62,7 @@ std::set<std::string> options_of(Run run, std::vector<std::string> command) {
 
 TEST(Completion, OffersCommands) {
   EXPECT_THAT(complete("dtactctl re"), UnorderedElementsAre("rezero", "record", "reconstruction"));
-  EXPECT_THAT(complete("dtactctl --port 7 s"), UnorderedElementsAre("status", "snapshot"));
+  EXPECT_THAT(complete("dtactctl --port 7 s"), UnorderedElementsAre("status", "snapshot", "setup"));
   EXPECT_THAT(complete("dtactctl calibration \"\""),
               UnorderedElementsAre("upload", "list", "show", "activate", "download", "pin", "unpin",
                                    "--help"));
@@ -100,21 +100,34 @@ TEST(Completion, KnowsEveryOptionOfEveryCommand) {
                   {"status"},
                   {"cameras"},
                   {"watch"},
+                  {"setup"},
                   {"bench"},
                   {"find"},
                   {"led"},
                   {"rezero"},
+                  {"reconstruction"},
                   {"snapshot"},
                   {"record"},
                   {"export"},
+                  {"cert"},
+                  {"token"},
                   {"calibration", "upload"},
                   {"calibration", "list"},
                   {"calibration", "show"},
                   {"calibration", "activate"},
+                  {"calibration", "pin"},
+                  {"calibration", "unpin"},
                   {"calibration", "download"}});
-  expect_options(
-      "dtact-calibrate", calibrate::run,
-      {{}, {"guided"}, {"depth"}, {"lens"}, {"apply"}, {"reprocess"}, {"evaluate"}, {"force"}});
+  expect_options("dtact-calibrate", calibrate::run,
+                 {{},
+                  {"guided"},
+                  {"depth"},
+                  {"lens"},
+                  {"import"},
+                  {"apply"},
+                  {"reprocess"},
+                  {"evaluate"},
+                  {"force"}});
 }
 
 }  // namespace

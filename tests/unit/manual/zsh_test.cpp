@@ -89,7 +89,7 @@ TEST_F(Zsh, OffersEveryCommandAndOption) {
   }
   std::vector<std::string> lines;
   for (const auto& [line, words] : expected) lines.push_back(line);
-  // dtactctl, its 14 commands, 5 of calibration; dtact-calibrate and its 7; dtact-perceive and its
+  // dtactctl, its 15 commands, 7 of calibration; dtact-calibrate and its 8; dtact-perceive and its
   // 2; dtact-web; dtactd.
   EXPECT_EQ(lines.size(), 1U + 15 + 7 + 2 + 1 + 8 + 1 + 1 + 2 + 1 + 1 + 1);
   for (const auto& [line, words] : offers(lines)) {
@@ -113,7 +113,7 @@ TEST_F(Zsh, OffersValuesAndFiles) {
       {"dtactctl led --brightness ", {}},
       // --summary is not offered: it excludes --draw.
       {"dtactctl watch --draw --s", {"--seconds"}},
-      {"dtactctl --port 7 s", {"status", "snapshot"}}};
+      {"dtactctl --port 7 s", {"setup", "status", "snapshot"}}};
   std::vector<std::string> lines;
   for (const auto& [line, words] : expected) lines.push_back(line);
   EXPECT_EQ(offers(lines), expected);
