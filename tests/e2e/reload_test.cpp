@@ -90,7 +90,7 @@ class Reload : public testing::Test {
 };
 
 TEST_F(Reload, TakesCertificateTokensAndLimits) {
-  const auto before = connect(old_, kOldToken);
+  auto before = connect(old_, kOldToken);
   const std::string renewed = make_pair_in("new");
   write("tokens", std::string("view ") + kNewToken + "\n");
   write("dtactd.toml", configuration("new", "max_clients = 2\n"));
@@ -107,6 +107,7 @@ TEST_F(Reload, TakesCertificateTokensAndLimits) {
   // A revoked token ends its open connections, too.
   EXPECT_THROW((void)before->status(), client::Error);
   EXPECT_THAT(daemon_->log(), HasSubstr("this client's token was revoked"));
+  before.reset();  // its place is free once it has closed, too
   const auto second = connect(renewed, kNewToken);
   EXPECT_THROW((void)connect(renewed, kNewToken), client::EndedByDaemon);  // the third
 }
