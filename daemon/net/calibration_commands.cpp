@@ -137,8 +137,9 @@ void CalibrationCommands::list(const Requester& requester) {
         if (list.failed()) return requester.refuse(list.code, list.error);
         const bool calibrated = self.port_.status().calibration != nullptr;
         requester.reply([&](v1::Reply& out) {
+          auto& calibrations = *out.mutable_calibrations();  // also when there is none
           for (const auto& stored : list.value) {
-            auto& one = *out.mutable_calibrations()->add_calibrations();
+            auto& one = *calibrations.add_calibrations();
             fill(stored, one);
             one.set_in_use(calibrated && stored.number == self.in_use_);
           }

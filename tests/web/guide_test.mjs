@@ -121,7 +121,7 @@ test("one that may only look may not calibrate", async () => {
     assert.equal(await lastWord(viewer.page, JSON.stringify(START)), "");
     assert.match(
       await lastWord(viewer.page, JSON.stringify(START), token),
-      /lets you look, not calibrate/,
+      /may not calibrate: connect with a token that allows calibrate/,
     );
     await viewer.page.getByLabel("Token").fill(token);
     await viewer.page.getByLabel("Token").press("Enter");

@@ -492,13 +492,13 @@ test("a value that a finger tapped stays when it lifts", async () => {
 });
 
 test("without a calibration the map's place offers to make one", async () => {
-  const bare = await startDaemon("bare", 0, ["calibration="]);
+  const bare = await startDaemon("bare", 0, ["calibration=", "camera.sim.calibration="]);
   const bareGateway = await startGateway({ bare: bare.port });
   const uncalibrated = await open(bareGateway);
   try {
     const offer = uncalibrated.page.locator(".veil").getByRole("button", { name: "Calibrate…" });
     await offer.click();
-    assert.ok(await uncalibrated.page.getByRole("dialog").isVisible());
+    await uncalibrated.page.getByRole("dialog").waitFor();
   } finally {
     await uncalibrated.close();
     await bareGateway.stop();

@@ -235,6 +235,16 @@ TEST(ListCalibrations, ReportsEverything) {
   EXPECT_EQ(current_of(client), 4U);
 }
 
+TEST(ListCalibrations, AnswersWithAnEmptyListWhereThereIsNone) {
+  Rig rig({}, answer_done);
+  rig.store.clear();
+  RawClient client(rig.tcp_port());
+  client.hello();
+  const auto reply = client.request(list());
+  ASSERT_TRUE(reply.has_calibrations());
+  EXPECT_EQ(reply.calibrations().calibrations_size(), 0);
+}
+
 TEST(ListCalibrations, ReportsTheOneInUse) {
   Rig rig({}, answer_done);
   RawClient client(rig.tcp_port());

@@ -21,6 +21,8 @@ namespace dtact::net::test {
 /// current. The text "bad" is not a calibration; making the one with "unwritable" current fails.
 class FakeStore : public CalibrationStore {
  public:
+  /// Before the first request.
+  void clear() { files_.clear(); }
   std::shared_ptr<const calibration::Calibration> check(
       const CalibrationFiles& files,
       const std::optional<calibration::FrameSize>& /*camera*/) override {

@@ -343,7 +343,7 @@ export class Pane {
       return frame.luma || this.stage.luma ? "" : "Waiting for the camera's picture.";
     if (frame.depth) return "";
     if (this.isUncalibrated(frame))
-      return this.sensor.mayControl
+      return this.sensor.mayCalibrate
         ? "No calibration yet."
         : "No calibration yet. Your token may watch, not calibrate.";
     if (frame.contact) return this.stage.depth ? "" : "Waiting for depth.";
@@ -360,7 +360,7 @@ export class Pane {
   }
 
   private offersCalibration(frame: Frame): boolean {
-    return this.isUncalibrated(frame) && this.sensor.mayControl;
+    return this.isUncalibrated(frame) && this.sensor.mayCalibrate;
   }
 
   private showRate(frame: Frame): void {
