@@ -89,10 +89,11 @@ std::function<void()> CalibrationCommands::job(Work work, Done done) {
 }
 
 void CalibrationCommands::next_job() {
-  if (working_ || waiting_.empty()) return;
+  auto& jobs = changes_.empty() ? waiting_ : changes_;
+  if (working_ || jobs.empty()) return;
   working_ = true;
-  asio::post(worker_, std::move(waiting_.front()));
-  waiting_.pop_front();
+  asio::post(worker_, std::move(jobs.front()));
+  jobs.pop_front();
 }
 
 void CalibrationCommands::get(const Requester& requester, const v1::GetCalibration& request) {

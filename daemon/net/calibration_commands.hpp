@@ -61,16 +61,16 @@ class CalibrationCommands : public std::enable_shared_from_this<CalibrationComma
   void send_reference(const Requester& requester,
                       const std::shared_ptr<const pipeline::ReferenceCopy>& reference);
   void report(const Change& change, std::optional<std::uint64_t> number);
-  /// Runs `work` on the worker and then `done`(*this, its result) here, after what waits already.
+  /// Queues `work` for the worker; `done`(*this, its result) runs here afterwards.
   template <typename Work, typename Done>
   void on_worker(Work work, Done done) {
     waiting_.push_back(job(std::move(work), std::move(done)));
     next_job();
   }
-  /// The same before all that waits: for what changes something, so that readers cannot delay it.
+  /// The same before all readers, in the order of the calls: for what changes something.
   template <typename Work, typename Done>
   void first_on_worker(Work work, Done done) {
-    waiting_.push_front(job(std::move(work), std::move(done)));
+    changes_.push_back(job(std::move(work), std::move(done)));
     next_job();
   }
   template <typename Work, typename Done>
@@ -92,7 +92,8 @@ class CalibrationCommands : public std::enable_shared_from_this<CalibrationComma
   bool changing_ = false;
   std::uint64_t last_key_ = 0;  ///< The pipeline's key of the newest calibration.
   int reading_ = 0;             ///< Requests on the worker that change nothing in the pipeline.
-  std::deque<std::function<void()>> waiting_;  ///< Jobs for the worker.
+  std::deque<std::function<void()>> changes_;  ///< Jobs for the worker that go first.
+  std::deque<std::function<void()>> waiting_;  ///< Its other jobs.
   bool working_ = false;
 };
 

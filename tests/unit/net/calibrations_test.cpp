@@ -124,6 +124,29 @@ TEST(PinCalibration, IsListed) {
   EXPECT_TRUE(all.calibrations(3).pinned());
 }
 
+TEST(PinCalibration, KeepsTheOrderOfCommandsThatWait) {
+  const Rig rig;
+  RawClient client(rig.tcp_port());
+  client.hello();
+  // All at once, so that the others wait while the first is on the worker.
+  std::string bytes;
+  for (std::uint64_t id = 1; id <= 3; ++id) {
+    v1::ClientMessage message;
+    if (id == 1) {
+      message = list();
+    } else {
+      message.mutable_pin_calibration()->set_number(3);
+      message.mutable_pin_calibration()->set_pinned(id == 2);
+    }
+    message.set_id(id);
+    bytes += std::string(3, '\0') + static_cast<char>(message.ByteSizeLong());
+    bytes += message.SerializeAsString();
+  }
+  client.send_bytes(bytes);
+  for (int i = 0; i < 3; ++i) (void)client.reply();
+  EXPECT_FALSE(client.request(list()).calibrations().calibrations(3).pinned());
+}
+
 TEST(Upload, NamesWhatIsWrong) {
   Rig rig({}, answer_done);
   RawClient client(rig.tcp_port());
