@@ -50,7 +50,7 @@ class Admission {
     /// after each wrong token of the same Peer.host. Right ones are never delayed.
     std::chrono::milliseconds delay{0};
   };
-  /// What enter() would say, without counting the client.
+  /// What enter() would say. Counts a wrong token, but not the client.
   [[nodiscard]] Verdict judge(const Peer& peer, const std::string& token);
   /// After a Hello with this token. Who is let in counts until leave().
   [[nodiscard]] Verdict enter(const Peer& peer, const std::string& token);

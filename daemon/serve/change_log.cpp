@@ -98,10 +98,11 @@ ChangeRecord describe_change(const Session& session, const v1::ClientMessage& me
   return {fmt::format("{}: {}", who, request), session.peer().address, session.token_name()};
 }
 
-void log_change(const Log& log, const ChangeRecord& change, const std::string& result) {
+void log_change(const Log& log, const ChangeRecord& change, const std::string& result,
+                LogSubject subject) {
   if (change.text.empty()) return;
-  log({LogLevel::info, fmt::format("{}: {}", change.text, result), change.client,
-       LogSubject::change, change.token});
+  log({LogLevel::info, fmt::format("{}: {}", change.text, result), change.client, subject,
+       change.token});
 }
 
 }  // namespace dtact::net

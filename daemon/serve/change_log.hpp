@@ -15,7 +15,7 @@ class Session;
 /// `text` without control characters, for the log.
 [[nodiscard]] std::string printable(std::string text);
 
-/// What the log says of a request that changes something, all but its result.
+/// The log line of a request that changes something, without its result.
 struct ChangeRecord {
   /// "192.168.1.7:40312 (dtactctl 0.1.0, token arm): set_light brightness 128"; empty for a request
   /// that changes nothing.
@@ -29,7 +29,9 @@ struct ChangeRecord {
 [[nodiscard]] ChangeRecord describe_change(const Session& session,
                                            const v1::ClientMessage& message);
 
-/// Logs the change with its result, "done" or the sentence that says why not.
-void log_change(const Log& log, const ChangeRecord& change, const std::string& result);
+/// Logs the change with its result, "done" or the sentence that says why not. Refusals for lack of
+/// rights are of a subject of their own, so that they cannot displace changes.
+void log_change(const Log& log, const ChangeRecord& change, const std::string& result,
+                LogSubject subject = LogSubject::change);
 
 }  // namespace dtact::net

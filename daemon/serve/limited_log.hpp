@@ -13,7 +13,7 @@
 namespace dtact::net {
 
 /// `log` with a rate limit for each subject, so that no client can fill the journal, and
-/// unauthenticated ones cannot displace what is said of others. The next line about the same
+/// unauthenticated ones cannot displace lines about others. The next line about the same
 /// subject says how many were left out.
 [[nodiscard]] inline Log limited(Log log) {
   struct Limit {
@@ -23,8 +23,10 @@ namespace dtact::net {
   struct State {
     Log log;
     // A program that dims the light with each frame has all of its commands in the log.
-    std::array<Limit, kLogSubjects> limits{
-        {{TokenBucket(10, 100)}, {TokenBucket(10, 100)}, {TokenBucket(100, 1000)}}};
+    std::array<Limit, kLogSubjects> limits{{{TokenBucket(10, 100)},
+                                            {TokenBucket(10, 100)},
+                                            {TokenBucket(100, 1000)},
+                                            {TokenBucket(10, 100)}}};
   };
   return [state = std::make_shared<State>(State{std::move(log)})](LogLine line) {
     Limit& limit = state->limits.at(static_cast<std::size_t>(line.subject));

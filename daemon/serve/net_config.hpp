@@ -19,12 +19,13 @@ enum class LogLevel : std::uint8_t { info, warning };
 /// What a line is about. Each has a rate limit of its own (limited()).
 enum class LogSubject : std::uint8_t {
   general,
-  unauthenticated,  ///< A client that has not been let in.
-  change            ///< A command that changes something.
+  unauthenticated,  ///< A client that is not authenticated.
+  change,           ///< A command that changes something.
+  denied            ///< One that the client's rights do not allow.
 };
-inline constexpr std::size_t kLogSubjects = 3;
+inline constexpr std::size_t kLogSubjects = 4;
 
-/// What the network part wants said.
+/// A line for the log.
 struct LogLine {
   LogLevel level = LogLevel::info;
   std::string text;

@@ -139,7 +139,7 @@ void Session::on_message() {
   if (decoder_.message().size() > kSmall && !is_plain_upload(decoder_.message())) {
     return end_with(0, v1::ERROR_TOO_LARGE,
                     fmt::format("a message of {} bytes came: only upload_calibration may have more "
-                                "than {}, with nothing but its id beside it",
+                                "than {}, with nothing but id and on_behalf_of beside it",
                                 decoder_.message().size(), kSmall));
   }
   v1::ClientMessage message;
@@ -170,7 +170,7 @@ void Session::on_message() {
                        "hello: sent already; it is the first message only");
   }
   if (const Rights needed = rights_for(message.request_case()); rights() < needed) {
-    log_change(config_.log, describe_change(*this, message), denial(needed));
+    log_change(config_.log, describe_change(*this, message), denial(needed), LogSubject::denied);
     return reply_error(message.id(), v1::ERROR_DENIED, denial(needed));
   }
   if (const auto host = host_.lock()) host->on_request(shared_from_this(), message);

@@ -131,7 +131,7 @@ class Session : public std::enable_shared_from_this<Session>, private Outbox::Ow
   bool skipping_stalled_reader_ =
       false;  ///< The last frame was not made, since the reader has stopped.
 
-  std::optional<Tokens::Grant> grant_;  ///< Once it is let in.
+  std::optional<Tokens::Grant> grant_;  ///< Set once authenticated.
   TokenBucket requests_;
   std::vector<char> input_;
   wire::MessageDecoder decoder_{wire::kMaxBeforeHello};

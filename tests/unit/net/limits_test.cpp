@@ -63,6 +63,16 @@ TEST(LimitedLog, SaysHowManyLinesItLeftOut) {
   EXPECT_EQ(lines.front(), "x");
 }
 
+TEST(LimitedLog, RefusedCommandsDisplaceNoChanges) {
+  std::vector<std::string> lines;
+  const Log log = limited([&lines](const LogLine& line) { lines.push_back(line.text); });
+  for (int i = 0; i < 5000; ++i) log({LogLevel::info, "denied", "", LogSubject::denied});
+  EXPECT_LT(lines.size(), 1000U);
+  lines.clear();
+  for (int i = 0; i < 1000; ++i) log({LogLevel::info, "light set", "", LogSubject::change});
+  EXPECT_EQ(lines.size(), 1000U);
+}
+
 TEST(LimitedLog, UnauthenticatedClientsDisplaceNobodyElsesLines) {
   std::vector<std::string> lines;
   const Log log = limited([&lines](const LogLine& line) { lines.push_back(line.text); });
