@@ -47,7 +47,9 @@ void SkipWatch::add(const hal::FrameInfo& info) noexcept {
   if (!std::exchange(have_before_, true)) began_ns_ = info.timestamp_ns;
   frames_ += passed;
   // A gap in which the camera lost frames says nothing about this machine.
-  if (passed > 1 && (info.flags & hal::kFrameAfterGap) == 0) skipped_ += passed - 1;
+  const std::uint64_t gap = passed > 1 ? passed - 1 : 0;
+  const std::uint64_t damaged = std::min(gap, std::exchange(damaged_, 0));
+  if ((info.flags & hal::kFrameAfterGap) == 0) skipped_ += gap - damaged;
   if (info.timestamp_ns - began_ns_ < kWindowNs) return;
   behind_ = static_cast<double>(skipped_) > kMaxSkipped * static_cast<double>(frames_);
   began_ns_ = info.timestamp_ns;
@@ -78,6 +80,7 @@ void CameraWatch::missed(hal::GrabStatus status, std::int64_t now_ns) noexcept {
       break;
     case hal::GrabStatus::damaged:
       lose(now_ns);
+      skips_.add_damaged();
       break;
     case hal::GrabStatus::timeout:
     case hal::GrabStatus::ok:

@@ -49,6 +49,8 @@ class RateWatch {
 class SkipWatch {
  public:
   void add(const hal::FrameInfo& info) noexcept;
+  /// A damaged frame took a sequence number: it was not skipped.
+  void add_damaged() noexcept { ++damaged_; }
   /// The camera was reopened: sequence numbers start again.
   void forget() noexcept { *this = {}; }
   /// Of the last two seconds' frames more than kMaxSkipped were skipped.
@@ -65,6 +67,7 @@ class SkipWatch {
   std::int64_t began_ns_ = 0;   // of the window
   std::uint64_t frames_ = 0;    // processed or skipped since then
   std::uint64_t skipped_ = 0;
+  std::uint64_t damaged_ = 0;  // since the previous frame
   bool behind_ = false;
 };
 

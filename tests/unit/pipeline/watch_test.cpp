@@ -204,6 +204,18 @@ TEST(SkipWatch, WhatTheCameraLostIsNotSkipped) {
   EXPECT_FALSE(watch.behind());
 }
 
+TEST(SkipWatch, DamagedFramesAreNotSkipped) {
+  SkipWatch watch;
+  hal::FrameInfo info;
+  for (int i = 0; i < 300; ++i) {
+    info.sequence += 2;
+    info.timestamp_ns += 2 * kPeriod;
+    watch.add_damaged();
+    watch.add(info);
+  }
+  EXPECT_FALSE(watch.behind());
+}
+
 TEST(SkipWatch, OneFrameInSecondsIsTooSlow) {
   SkipWatch watch;
   hal::FrameInfo info;
