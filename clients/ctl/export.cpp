@@ -287,6 +287,7 @@ void run_export(const cli::Context& context, const ExportOptions& options) {
   report.set_frames(exporter.frames());
   report.set_maps(exporter.maps());
   report.set_damage(file.damage());
+  report.set_out_of_order(file.out_of_order());
   if (context.json) {
     context.out << cli::json_line(report);
     return;
@@ -294,8 +295,12 @@ void run_export(const cli::Context& context, const ExportOptions& options) {
   context.out << fmt::format("{}: {} frames, {} depth maps\n", report.output(), report.frames(),
                              report.maps());
   if (!report.damage().empty()) {
-    context.out << fmt::format(
-        "not all of the recording could be read ({}): all the rest is exported\n", report.damage());
+    context.out << fmt::format("parts of the recording could not be read and were skipped: {}\n",
+                               report.damage());
+  }
+  if (report.out_of_order() > 0) {
+    context.out << fmt::format("{} messages are earlier than one before them; the order is kept\n",
+                               report.out_of_order());
   }
 }
 

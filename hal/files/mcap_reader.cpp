@@ -310,7 +310,7 @@ std::string Reader::damage() const {
   };
   if (const Unreadable& chunks = impl_->chunks; chunks.count > 0) {
     add(fmt::format("{} of {} chunks cannot be read, the first because of {}", chunks.count,
-                    impl_->places.size(), chunks.first));
+                    std::ranges::count(impl_->places, true, &Place::chunk), chunks.first));
   }
   if (const Unreadable& messages = impl_->messages; messages.count > 0) {
     add(fmt::format("{} message(s) cannot be read, the first because of {}", messages.count,
@@ -320,11 +320,10 @@ std::string Reader::damage() const {
     add(fmt::format("{} of {} messages are not there", impl_->missing,
                     impl_->statistics->messages));
   }
-  if (impl_->out_of_order > 0) {
-    add(fmt::format("{} message(s) are earlier than one before them", impl_->out_of_order));
-  }
   return text;
 }
+
+std::uint64_t Reader::out_of_order() const noexcept { return impl_->out_of_order; }
 
 void Reader::count_unreadable(const std::string& why) const { impl_->messages.add(why); }
 

@@ -37,7 +37,9 @@ class Reader {
   /// Empty when the file is whole; else where it ends or is damaged, and what the latest read()
   /// could not read: the number of chunks and messages, the first with its reason.
   [[nodiscard]] std::string damage() const;
-  /// To be called in read() for a message that its reader cannot use; damage() then counts it.
+  /// Messages of the latest read() that were earlier than one before them in their channel.
+  [[nodiscard]] std::uint64_t out_of_order() const noexcept;
+  /// Counts a message that the caller cannot use, until the next read(); damage() names it.
   void count_unreadable(const std::string& why) const;
   [[nodiscard]] const std::map<std::uint16_t, Schema>& schemas() const noexcept;
   [[nodiscard]] const std::map<std::uint16_t, Channel>& channels() const noexcept;

@@ -95,6 +95,7 @@ class Reprocessor {
     report.set_frames(frames_);
     report.set_maps(maps_);
     report.set_damage(file_.damage());
+    report.set_out_of_order(file_.out_of_order());
     return report;
   }
 
@@ -249,8 +250,12 @@ void run(const cli::Context& context, const Options& options) {
         reprocessor.unsharpened(), options.calibration);
   }
   if (!report.damage().empty()) {
-    context.out << fmt::format(
-        "not all of the recording could be read ({}): all the rest is in it\n", report.damage());
+    context.out << fmt::format("parts of the recording could not be read and were skipped: {}\n",
+                               report.damage());
+  }
+  if (report.out_of_order() > 0) {
+    context.out << fmt::format("{} messages are earlier than one before them; the order is kept\n",
+                               report.out_of_order());
   }
 }
 

@@ -15,9 +15,10 @@ TEST(Json, NumbersOfEveryTypeAreNumbers) {
   RecordingReport report;
   report.set_output("press.mcap");
   report.set_frames(18446744073709551615U);
-  EXPECT_EQ(json_line(report),
-            R"({"output":"press.mcap","frames":18446744073709551615,"maps":0,"damage":""})"
-            "\n");
+  EXPECT_EQ(
+      json_line(report),
+      R"({"output":"press.mcap","frames":18446744073709551615,"maps":0,"damage":"","out_of_order":0})"
+      "\n");
   v1::LightState light;
   light.set_since_ns(-9007199254740993);
   light.set_gamma(2.2);

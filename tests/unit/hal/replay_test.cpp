@@ -402,7 +402,7 @@ TEST_F(ReplayMcap, PlaysInTheOrderOfTheTimesAndReportsWhatIsLeftOut) {
   EXPECT_DOUBLE_EQ(camera.info().fps, 50);
   EXPECT_THAT(camera.report().fix, HasSubstr("4 message(s) cannot be read, the first because of "
                                              "/camera0, message 4: is no"));
-  EXPECT_THAT(camera.report().fix, HasSubstr("5 message(s) are earlier than one before them"));
+  EXPECT_THAT(camera.report().fix, Not(HasSubstr("earlier"))) << "frames are played by their time";
   camera.start();
   for (const auto& [ms, grey] : {std::pair{0, 10}, {10, 20}, {40, 30}}) {
     ASSERT_EQ(camera.grab(frame, milliseconds(50)), GrabStatus::ok);
