@@ -218,9 +218,9 @@ void refuse_exchanged(const Darkening& image, const Settled& settled, const Boar
 struct Side {
   const char* where;  ///< "left", ...
   std::string line;   ///< "column 1", ...
-  int pins = 0;       ///< That the line has.
-  int found = 0;      ///< Of those.
-  int beyond = 0;     ///< What would pass for pins further out.
+  int pins = 0;       ///< Pins of the line.
+  int found = 0;      ///< Pins found.
+  int beyond = 0;     ///< Peaks that would count as pins one line further out.
 };
 
 Side side_of(const Darkening& image, const Settled& settled, const Board& board, bool rows,
@@ -245,6 +245,12 @@ Side side_of(const Darkening& image, const Settled& settled, const Board& board,
   for (int i = 0; i < side.pins; ++i) {
     const int further = last ? count : -1;
     const Point mm = place_mm(board, lattice, rows ? further : i, rows ? i : further);
+    const Point px = project(settled.lens, mm);
+    // Beyond the edge the image repeats its last row, in which a bend of the light passes for a
+    // pin.
+    if (px.x < 0 || px.y < 0 || px.x > image.levels.cols - 1 || px.y > image.levels.rows - 1) {
+      continue;
+    }
     const auto peak = fit.find(settled.lens, mm, kWithin * board.pitch_mm);
     side.beyond +=
         static_cast<int>(peak && peak->height > kNeighbours * usual &&
