@@ -57,13 +57,8 @@ std::string shell_word(const std::string& word) {
 
 std::string options_of(const CLI::App& app) {
   std::string text;
-  for (const CLI::Option* option : app.get_options()) {
-    if (option->count() == 0) continue;
-    text += " " + option->get_name();
-    if (option->get_items_expected_max() == 0) continue;
-    std::string value;
-    for (const std::string& part : option->results()) value += (value.empty() ? "" : ",") + part;
-    text += " " + shell_word(value);
+  for (const std::string& word : given_options(app)) {
+    text += " " + (word.starts_with("--") ? word : shell_word(word));
   }
   return text;
 }
@@ -85,6 +80,17 @@ CLI::Validator in_range(double least, double most) {
 }
 
 CLI::Validator positive() { return number_check(1e-9, 1e9, "POSITIVE"); }
+
+std::vector<std::string> given_options(const CLI::App& app) {
+  std::vector<std::string> words;
+  for (const CLI::Option* option : app.get_options()) {
+    if (option->count() == 0 || option->get_positional()) continue;
+    words.push_back(option->get_name());
+    if (option->get_items_expected_max() == 0) continue;
+    words.push_back(fmt::format("{}", fmt::join(option->results(), ",")));
+  }
+  return words;
+}
 
 std::string command_line(const CLI::App& command) {
   std::string text = " " + command.get_name() + options_of(command);

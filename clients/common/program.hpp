@@ -21,6 +21,10 @@ struct Context {
 /// the program's name and version.
 void add_global_options(CLI::App& app, Context& context);
 
+/// The options that were given to a command, those of its parents left out, as words of a command
+/// line.
+[[nodiscard]] std::vector<std::string> given_options(const CLI::App& app);
+
 /// As CLI::Range and CLI::PositiveNumber, which let NaN pass: refuses all that is no number in the
 /// range, and for positive() what is above 1e9.
 [[nodiscard]] CLI::Validator in_range(double least, double most);

@@ -72,19 +72,35 @@ int run_program(const Command& command, std::ostream& out) {
 
 class Setup {
  public:
-  Setup(const Context& context, SetupOptions options)
-      : context_(context), options_(std::move(options)) {
-    if (!options_.config.empty()) return;
-    const std::size_t at = options_.unit.find('@');
-    options_.config = fmt::format(
-        "/etc/dtactd/{}.toml", at == std::string::npos ? "dtactd" : options_.unit.substr(at + 1));
+  Setup(const Context& context, const CLI::App& command, SetupOptions options)
+      : context_(context),
+        command_(command),
+        options_(std::move(options)),
+        target_(context.target),
+        target_words_(cli::given_options(*command.get_parent())) {
+    if (options_.config.empty()) {
+      const std::size_t at = options_.unit.find('@');
+      options_.config = fmt::format(
+          "/etc/dtactd/{}.toml", at == std::string::npos ? "dtactd" : options_.unit.substr(at + 1));
+    }
+    const auto given = [this](const char* option) {
+      return std::ranges::find(target_words_, option) != target_words_.end();
+    };
+    if (given("--host") || given("--port")) return;
+    // The unit's own daemon: others may listen on the usual port.
+    const Settings settings = settings_of(base::read_file(options_.config), options_.config);
+    const std::string port = value_of(settings, "net.port");
+    if (port.empty() || port.find_first_not_of("0123456789") != std::string::npos) return;
+    target_.port = static_cast<std::uint16_t>(std::stoi(port));
+    target_words_.insert(target_words_.end(), {"--port", port});
   }
 
   void run() {
     const bool all = options_.steps.empty();
-    for (const std::string& step : all ? kSteps : options_.steps) {
+    left_ = all ? kSteps : options_.steps;
+    for (; !left_.empty(); left_.erase(left_.begin())) {
+      const std::string& step = left_.front();
       context_.out << fmt::format("\n{} of {}: {}\n", number_of(step), kSteps.size(), step);
-      step_ = step;
       if (step == "camera") set_camera();
       if (step == "check") check();
       if (step == "restart") restart();
@@ -98,11 +114,11 @@ class Setup {
     return std::ranges::find(kSteps, step) - kSteps.begin() + 1;
   }
 
-  /// Ends the command; names the steps that are left.
+  /// Ends the command; gives the command line for the steps that are left.
   [[noreturn]] void stop(const std::string& what) const {
-    const std::vector<std::string> left(kSteps.begin() + number_of(step_) - 1, kSteps.end());
-    throw cli::Failure(
-        cli::kNotMet, fmt::format("{}; then go on: dtactctl setup {}", what, fmt::join(left, " ")));
+    throw cli::Failure(cli::kNotMet,
+                       fmt::format("{}; then continue with: {} {}", what,
+                                   cli::command_line(command_), fmt::join(left_, " ")));
   }
 
   /// A line typed here; empty when nothing can be. Byte by byte: the rest is the next program's.
@@ -158,8 +174,9 @@ class Setup {
     const bool named = !options_.camera.empty();
     std::erase_if(cameras, [&](const hal::v4l2::SurveyedCamera& camera) {
       const hal::v4l2::Attached& who = camera.attached;
-      if (!named) return !who.not_taken.empty();
-      return options_.camera != who.stable_name() && options_.camera != who.by_id &&
+      // Another node of the same camera has its serial and bus, and delivers no frames.
+      if (!who.not_taken.empty()) return !named || options_.camera != who.node;
+      return named && options_.camera != who.stable_name() && options_.camera != who.by_id &&
              options_.camera != who.node && options_.camera != "serial:" + who.serial &&
              options_.camera != "bus:" + who.bus;
     });
@@ -244,6 +261,11 @@ class Setup {
     fs::remove(trial, ignored);
     if (status != 0) stop("dtactd refuses these settings, nothing is written: see above");
     base::write_file_atomically(options_.config, after, about.st_mode & 0777U);
+    // The daemon's group reads it.
+    if (::chown(options_.config.c_str(), about.st_uid, about.st_gid) != 0) {
+      stop(fmt::format("{} is written, but its owner could not be restored ({}): run it by sudo",
+                       options_.config, std::strerror(errno)));
+    }
     context_.out << options_.config << " is written\n";
   }
 
@@ -271,13 +293,19 @@ class Setup {
   /// The daemon's status once it gets frames.
   [[nodiscard]] v1::Status wait_for_camera() const {
     std::string why;
-    for (int tries = 0; tries < 150; ++tries) {
+    const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(30);
+    while (std::chrono::steady_clock::now() < deadline) {
       try {
-        v1::Status status = client::Client(context_.target).status();
+        v1::Status status = client::Client(target_).status();
         if (status.camera().delivered() > 0 && status.state() != v1::STATE_CAMERA_LOST) {
           return status;
         }
         why = status.advice();
+      } catch (const client::IdentityError&) {
+        throw;
+      } catch (const client::Refused& e) {
+        if (e.code() == v1::ERROR_DENIED) throw;
+        why = e.what();
       } catch (const client::Error& e) {
         why = e.what();
       }
@@ -332,13 +360,15 @@ class Setup {
   }
 
   void add_target(Command& command) const {
-    command.insert(command.end(), {"--host", context_.target.host, "--port",
-                                   std::to_string(context_.target.port)});
+    command.insert(command.end(), target_words_.begin(), target_words_.end());
   }
 
   const Context& context_;
+  const CLI::App& command_;
   SetupOptions options_;
-  std::string step_;
+  client::Options target_;                 // the unit's daemon
+  std::vector<std::string> target_words_;  // the same as options of the other programs
+  std::vector<std::string> left_;          // steps, the present one first
 };
 
 }  // namespace
@@ -371,13 +401,17 @@ void add_setup(CLI::App& app, Context& context) {
                    "Board's configuration whose camera and ring are taken: a file, or a name in "
                    "/usr/share/doc/dtactd/examples/boards (default: of the board that this is)")
       ->type_name("NAME");
-  command->add_option("--radius-mm", options->radius_mm, "As of dtact-calibrate guided; else asked")
+  command
+      ->add_option("--radius-mm", options->radius_mm,
+                   "See dtact-calibrate guided; asked for if not given")
       ->type_name("MM");
-  command->add_option("--mm-per-px", options->mm_per_px, "As of dtact-calibrate guided; else asked")
+  command
+      ->add_option("--mm-per-px", options->mm_per_px,
+                   "See dtact-calibrate guided; asked for if not given")
       ->type_name("MM");
-  command->add_option("--lens", options->lens, "As of dtact-calibrate guided")->type_name("FILE");
-  command->add_option("--crop", options->crop, "As of dtact-calibrate guided")->type_name("W,H");
-  command->callback([&context, options] { Setup(context, *options).run(); });
+  command->add_option("--lens", options->lens, "See dtact-calibrate guided")->type_name("FILE");
+  command->add_option("--crop", options->crop, "See dtact-calibrate guided")->type_name("W,H");
+  command->callback([&context, command, options] { Setup(context, *command, *options).run(); });
 }
 
 }  // namespace dtact::ctl

@@ -8,8 +8,10 @@
 #include <sys/socket.h>
 
 #include <algorithm>
+#include <chrono>
 #include <csignal>
 #include <fstream>
+#include <thread>
 
 #include "hal/base/atomic_file.hpp"
 #include "hal/base/unique_fd.hpp"
@@ -66,7 +68,11 @@ class Setup : public testing::Test {
     fs::permissions(bin / "systemctl", fs::perms::owner_all);
   }
   ~Setup() override {
-    if (fs::exists(file("pid"))) ::kill(std::stoi(base::read_file(file("pid"))), SIGTERM);
+    if (!fs::exists(file("pid"))) return;
+    const pid_t pid = std::stoi(base::read_file(file("pid")));
+    ::kill(pid, SIGTERM);
+    // It writes into the folder until it has ended.
+    while (::kill(pid, 0) == 0) std::this_thread::sleep_for(std::chrono::milliseconds(20));
   }
 
   static void replace(std::string& text, const std::string& from, const std::string& to) {
@@ -84,8 +90,6 @@ class Setup : public testing::Test {
                                         folder_.path().string(),
                                         "PATH=" + file("bin").string() + ":/usr/bin:/bin",
                                         "dtactctl",
-                                        "--port",
-                                        std::to_string(port_),
                                         "setup",
                                         "--config",
                                         config().string()};
@@ -131,8 +135,9 @@ TEST_F(Setup, StopsWithWhatToDoAndHowToGoOn) {
   const std::string before = base::read_file(config());
   EXPECT_EQ(setup({"--camera", "serial:none"}), kNotMet);
   EXPECT_THAT(output_, AllOf(HasSubstr("no camera serial:none is attached"),
-                             HasSubstr("then go on: dtactctl setup camera check restart calibrate "
-                                       "watch")));
+                             HasSubstr("then continue with: dtactctl setup --config "),
+                             HasSubstr(" --camera serial:none"),
+                             HasSubstr(" camera check restart calibrate watch")));
   std::ofstream(file("board.toml")) << "[camera]\nbackend = \"libcamera\"\nwidth = 1\n";
   EXPECT_EQ(setup({"camera", "--board", file("board.toml").string()}), kNotMet);
   EXPECT_THAT(output_, AllOf(HasSubstr("camera.width"), HasSubstr("nothing is written")));
