@@ -29,7 +29,7 @@ void add_listen_options(CLI::App& command, net::NetConfig& settings) {
   command.add_flag(
       "--listen-insecure", settings.insecure,
       "Listen beyond this machine without TLS or tokens: every host that reaches it may "
-      "watch and command");
+      "connect");
 }
 
 void reload_at_hangup(boost::asio::signal_set& hangups, const net::Log& log,

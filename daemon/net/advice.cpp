@@ -82,9 +82,7 @@ constexpr std::array<Fix, pipeline::kHealthCount> kFixes = {{
      "reconstruction)."},
     {Health::frames_lost,
      "The camera loses frames on their way to this machine: look at the USB cable and hub."},
-    {Health::not_realtime,
-     "The capture thread runs without real-time scheduling: start dtactd from its systemd unit or "
-     "grant it LimitRTPRIO and LimitMEMLOCK."},
+    {Health::not_realtime, "The capture thread runs without real-time scheduling."},
 }};
 
 void add(std::string& text, std::string_view sentence) {
@@ -115,6 +113,12 @@ std::string detail(const pipeline::Status& status, Health health) {
   if (health == Health::camera_mismatch) return status.camera_report.moved;
   if (health == Health::camera_shifted) return status.camera_shift_message;
   if (health == Health::ring_fault) return status.ring_message;
+  if (health == Health::not_realtime) {
+    return status.realtime.empty()
+               ? "It ran too long without waiting and lost its priority: lower camera.fps or the "
+                 "picture's size, then restart dtactd."
+               : "Start dtactd from its systemd unit or grant it LimitRTPRIO and LimitMEMLOCK.";
+  }
   return {};
 }
 

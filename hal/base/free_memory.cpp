@@ -2,6 +2,7 @@
 
 #include <malloc.h>
 #include <sys/mman.h>
+#include <sys/resource.h>
 
 #include <fstream>
 #include <string>
@@ -20,13 +21,20 @@ bool is_memory_locked() {
   return false;
 }
 
+/// Locking again counts the whole address space against a finite limit, and could fail.
+bool can_lock_again() {
+  rlimit limit{};
+  return ::getrlimit(RLIMIT_MEMLOCK, &limit) == 0 && limit.rlim_cur == RLIM_INFINITY;
+}
+
 }  // namespace
 
 void release_free_memory() {
   const bool locked = is_memory_locked();
+  if (locked && !can_lock_again()) return;
   if (locked) ::munlockall();
   (void)::malloc_trim(0);
-  if (locked) (void)lock_memory();  // it was granted before
+  if (locked) (void)lock_memory();
 }
 
 }  // namespace dtact::base

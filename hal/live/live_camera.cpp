@@ -242,7 +242,9 @@ LiveCamera::Collected LiveCamera::collect(Frame& out) noexcept {
         note_delivery();
       } else {
         count_damage(status);
-        damage_reason_.store(connection_->decoder.damage());
+        if (status == PayloadStatus::undecodable) {
+          damage_reason_.store(connection_->decoder.damage());
+        }
       }
       damaged = damaged || !done;
       if (kept) continue;

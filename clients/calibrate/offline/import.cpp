@@ -225,12 +225,14 @@ void print_ball(const calibration::Evaluation& ours, const Published& published,
   if (published.ball) {
     row(published.name, *published.ball);
   } else {
-    fmt::print("  {}: not to be compared: {}\n", published.name, published.why_not);
+    fmt::print("  {}: cannot be compared: {}\n", published.name, published.why_not);
   }
-  fmt::print(
-      "this calibration, made from a part of the press, on the rest: {:.4f} mm mean over "
-      "sectors, {:.4f} mm over halves (at worst {:.4f} mm)\n",
-      ours.sector_mae_mm.value_or(0), ours.half_mae_mm.value_or(0), ours.half_worst_mm.value_or(0));
+  if (ours.sector_mae_mm && ours.half_mae_mm && ours.half_worst_mm) {
+    fmt::print(
+        "this calibration, made from a part of the press, on the rest: {:.4f} mm mean over "
+        "sectors, {:.4f} mm over halves (at worst {:.4f} mm)\n",
+        *ours.sector_mae_mm, *ours.half_mae_mm, *ours.half_worst_mm);
+  }
 }
 
 void print_next(const ImportOptions& options, const ImportSettings& settings,
@@ -312,11 +314,11 @@ void add_import(CLI::App& app) {
   command
       ->add_option("--pitch-mm", options->pitch_mm,
                    "Distance of neighbouring pins, mm (default: the configuration's, or 2.5)")
-      ->check(CLI::Range(0.1, 100.0));
+      ->check(cli::in_range(0.1, 100.0));
   command
       ->add_option("--radius-mm", options->radius_mm,
                    "Radius of the ball, mm (default: the configuration's, or 4)")
-      ->check(CLI::Range(0.2, 99.0));
+      ->check(cli::in_range(0.2, 99.0));
   command
       ->add_option("-o,--output", options->output,
                    "Folder to write; an old calibration is replaced")

@@ -176,7 +176,7 @@ TEST_F(Import, SaysWhatItUsesInPlaceOfWhat) {
   text("Pixel_to_Depth.npy", npy(std::vector<double>(40)).substr(0, 200));
   const std::string said = run({"--pitch-mm", "2.4"});
   EXPECT_THAT(said, HasSubstr("--pitch-mm: 2.4 is used, though shape_config.yaml:10 says 2.3"));
-  EXPECT_THAT(said, HasSubstr("Pixel_to_Depth.npy: not to be compared: "));
+  EXPECT_THAT(said, HasSubstr("Pixel_to_Depth.npy: cannot be compared: "));
   EXPECT_NEAR(recon::central_mm_per_px(*calibration::load(at("cal")).lens), 2.4 / 2.3 / 24, 0.0005);
 }
 

@@ -75,6 +75,7 @@ TEST(Status, IsPrinted) {
   pipeline::Status status;
   status.state = pipeline::State::serving;
   status.health.set(pipeline::Health::not_realtime);
+  status.realtime = {"capture: no real-time priority"};
   status.camera.backend = "sim";
   status.stages = {{"activity", 3, 9, 20}};
   status.light_followed = -0.0042;

@@ -304,15 +304,19 @@ class Camera:
                     self._seen[reader] = self._count
                 return self._newest
             if self._error is not None:
-                raise self._NotConnected(str(self._error)) from self._error
+                raise self._lost(self._error) from self._error
         raise NoFrame(f"{self}: no new frame within {timeout_ms:g} ms; dtactctl status says why")
+
+    def _lost(self, error: Exception) -> Exception:
+        """The error as a reader gets it: one that says more than a lost connection stays."""
+        return error if isinstance(error, self._NotConnected) else self._NotConnected(str(error))
 
     def _latest(self, max_age_ms: float) -> Frame:
         with self._changed:
             frame, age_ms = self._newest, (time.perf_counter() - self._came_at) * 1e3
             error = self._error
         if error is not None and (frame is None or age_ms > max_age_ms):
-            raise self._NotConnected(str(error)) from error
+            raise self._lost(error) from error
         if frame is None:
             raise RuntimeError(f"{self}: no frame has come yet")
         if age_ms > max_age_ms:

@@ -75,7 +75,7 @@ class Page {
     const chosen = Array.isArray(before) ? names.filter((name) => before.includes(name)) : [];
     // At first as many as fit beside each other.
     const first = chosen.length > 0 ? chosen : names.slice(0, 2);
-    const fresh = this.shown.size === 0;
+    const fresh = this.buttons.size === 0;
     for (const { name, connected, error } of sensors) {
       let made = this.buttons.get(name);
       if (!made) {

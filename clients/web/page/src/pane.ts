@@ -257,6 +257,7 @@ export class Pane {
   private link(link: Link): void {
     this.element.dataset["link"] = link.state;
     this.commands.inert = link.state !== "live";
+    this.calibrate.disabled = link.state !== "live";
     say(
       this.state,
       {
@@ -345,7 +346,7 @@ export class Pane {
     if (this.isUncalibrated(frame))
       return this.sensor.mayCalibrate
         ? "No calibration yet."
-        : "No calibration yet. Your token may watch, not calibrate.";
+        : "No calibration yet. This client may not calibrate.";
     if (frame.contact) return this.stage.depth ? "" : "Waiting for depth.";
     const advice = this.lastStatus?.advice ?? "";
     return this.frame && advice ? advice : "No depth at present.";

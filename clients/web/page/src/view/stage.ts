@@ -304,6 +304,8 @@ export class Stage {
   }
 
   private steer(event: KeyboardEvent): void {
+    // The browser's own zoom and the like.
+    if (event.ctrlKey || event.metaKey) return;
     const factor = { "+": 1.5, "-": 1 / 1.5, "0": 0 }[event.key];
     if (factor !== undefined) {
       event.stopPropagation();
