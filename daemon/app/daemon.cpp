@@ -74,8 +74,8 @@ std::string passed_over(const net::FolderCalibrationStore& store, bool configure
       configured ? "the configured calibration" : "no calibration");
 }
 
-/// The calibration to start with; null when there is none, or none that can be read. `note`
-/// becomes what the status is to say of that.
+/// The calibration to start with; null when there is none, or none that can be read. `note` becomes
+/// a sentence for the status when something is wrong with it.
 std::shared_ptr<const calibration::Calibration> load_calibration(const fs::path& folder,
                                                                  const Config& config,
                                                                  std::string& note) {

@@ -163,8 +163,7 @@ void add_clients(Families& to, const net::Overview& overview) {
              endpoint.certificate_days());
   }
   const net::Traffic& traffic = overview.traffic;
-  to.gauge("dtactd_clients", "Clients that are connected and greeted.",
-           overview.status.clients_size());
+  to.gauge("dtactd_clients", "Authenticated clients.", overview.status.clients_size());
   to.counter("dtactd_connections_total", "Connections accepted.", traffic.connections);
   to.counter("dtactd_connections_refused_total", "Of those, refused as too many.", traffic.refused);
   to.counter("dtactd_frames_encoded_total",

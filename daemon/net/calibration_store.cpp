@@ -242,7 +242,7 @@ std::vector<StoredCalibration> FolderCalibrationStore::remove_old() const {
       old.name = name_of(folder_of(number));
       old.uploaded = time_of(folder_of(number));
     } catch (const std::exception&) {
-      old.name = "damaged";
+      old.name = "(damaged)";
     }
     // Out of the list in one step: half a folder would be listed as a damaged calibration.
     fs::remove_all(stale, ignored);

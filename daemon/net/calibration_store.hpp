@@ -37,13 +37,13 @@ struct StoredCalibration {
   bool pinned = false;                             ///< Never removed.
 };
 
-/// What keeping an upload came to.
+/// The result of keep().
 struct KeptCalibration {
   std::uint64_t number = 0;
   std::vector<StoredCalibration> removed = {};  ///< Number, name and time of upload alone.
 };
 
-/// There is none of the number that was asked for.
+/// No calibration has the requested number.
 class NoSuchCalibration : public std::invalid_argument {
  public:
   using std::invalid_argument::invalid_argument;
@@ -64,7 +64,8 @@ class CalibrationStore {
   /// key and fix.
   [[nodiscard]] virtual std::shared_ptr<const calibration::Calibration> check(
       const CalibrationFiles& files, const std::optional<calibration::FrameSize>& camera) = 0;
-  /// Stores checked files under a new number and makes them current. Removes what is too much then.
+  /// Stores checked files under a new number and makes them current. Removes the calibrations
+  /// beyond those that stay.
   virtual KeptCalibration keep(const CalibrationFiles& files) = 0;
   /// All there are: the configured one, then by number. Each is read and checked before it is
   /// listed for the first time, unless its files are those that check() accepted, and again when
@@ -118,11 +119,12 @@ class FolderCalibrationStore : public CalibrationStore {
   /// configured one. Empty when there is none.
   [[nodiscard]] std::filesystem::path current() const;
 
-  /// Notes that a start is about to read the current uploaded calibration. False: kMaxFailedStarts
-  /// of them did not come to end_start(), so this one has to do without it, and started_number() is
-  /// the configured one's. So it stays until another one, or the same again, becomes current.
+  /// Counts a start that is about to read the current uploaded calibration. False after
+  /// kMaxFailedStarts starts that did not reach end_start(): this one runs without it, and
+  /// started_number() is the configured one's, until another one, or the same again, becomes
+  /// current.
   [[nodiscard]] bool begin_start();
-  /// What could end the daemon because of its calibration is done.
+  /// The start has outlived its calibration.
   void end_start();
 
   [[nodiscard]] std::shared_ptr<const calibration::Calibration> check(

@@ -37,7 +37,7 @@ class Hub : public SessionHost, public std::enable_shared_from_this<Hub> {
   void admit(const std::shared_ptr<Session>& session);
   /// Ends the clients whose token was revoked or has other rights now.
   void end_revoked() const { session_list_.end_revoked(); }
-  /// To every client that has been greeted and wants events.
+  /// To every authenticated client that wants events.
   void broadcast(const v1::ServerMessage& event) { session_list_.broadcast(event); }
   /// What the calibration is called on the wire that the pipeline knows by this key.
   void number_calibration(std::uint64_t key, std::uint64_t number) { numbers_[key] = number; }

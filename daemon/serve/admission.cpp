@@ -88,18 +88,18 @@ bool Admission::hold(std::size_t before, std::size_t now) noexcept {
 }
 
 void Admission::unread(const void* client, const std::string& host, std::size_t bytes,
-                       std::function<void()> give_up) {
+                       std::function<void()> disconnect) {
   if (const auto found = unread_.find(client); found != unread_.end()) {
     unread_bytes_ -= found->second.bytes;
     unread_.erase(found);
   }
   if (bytes == 0) return;
-  unread_[client] = {host, bytes, std::move(give_up)};
+  unread_[client] = {host, bytes, std::move(disconnect)};
   unread_bytes_ += bytes;
   while (unread_bytes_ > kMaxUnread) {
     const auto worst = worst_beside(client);
     if (worst == unread_.end()) return;  // one alone has at most Outbox::kMaxBytes and a message
-    const auto end = std::move(worst->second.give_up);
+    const auto end = std::move(worst->second.disconnect);
     unread_bytes_ -= worst->second.bytes;
     unread_.erase(worst);
     end();

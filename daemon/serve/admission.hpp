@@ -19,13 +19,14 @@ namespace dtact::net {
 /// read_private_file().
 [[nodiscard]] std::optional<Tokens> read_tokens(const NetConfig& config);
 
-/// Who is let in, with which rights, and what all clients together may take. On the network thread.
+/// Decides which clients are authenticated and with which rights, and limits what all clients
+/// together take. On the network thread.
 class Admission {
  public:
   /// Bytes of large messages that have arrived in part, of all clients together: two of the
   /// longest.
   static constexpr std::size_t kMaxIncoming = std::size_t{32} << 20U;
-  /// Bytes of large answers that lie unread, of all clients together: two of the longest.
+  /// Bytes of large answers that are unread, of all clients together: two of the longest.
   static constexpr std::size_t kMaxUnread = std::size_t{32} << 20U;
   /// Delay of the answer to an address's first wrong token. It doubles with each further one.
   static constexpr std::chrono::milliseconds kDenial{500};
@@ -39,7 +40,8 @@ class Admission {
   /// Throws as read_tokens().
   explicit Admission(const NetConfig& config);
 
-  /// Who is in already stays in until the owner of the connection asks still_allows().
+  /// Authenticated clients keep their rights until the owner of the connection asks
+  /// still_allows().
   void set_tokens(std::optional<Tokens> tokens) noexcept { tokens_ = std::move(tokens); }
 
   struct Verdict {
@@ -52,7 +54,7 @@ class Admission {
   };
   /// What enter() would say. Counts a wrong token, but not the client.
   [[nodiscard]] Verdict judge(const Peer& peer, const std::string& token);
-  /// After a Hello with this token. Who is let in counts until leave().
+  /// After a Hello with this token. An authenticated client counts until leave().
   [[nodiscard]] Verdict enter(const Peer& peer, const std::string& token);
   void leave(const Peer& peer);
   /// False: its token was revoked since, or has other rights now.
@@ -63,11 +65,11 @@ class Admission {
   /// A client's message takes `now` bytes instead of `before`. False when that is too much for all
   /// of them together; it counts all the same.
   [[nodiscard]] bool hold(std::size_t before, std::size_t now) noexcept;
-  /// `bytes` of the answers to `client`, of Peer.host `host`, lie unread. When all clients together
-  /// have more than kMaxUnread, others are given up: those with most of the host that has most.
-  /// `give_up` is called then, and has to end the connection.
+  /// `bytes` of the answers to `client`, of Peer.host `host`, are unread. When all clients together
+  /// have more than kMaxUnread, others are disconnected: those with most of the host that has most.
+  /// `disconnect` is called then, and ends the connection.
   void unread(const void* client, const std::string& host, std::size_t bytes,
-              std::function<void()> give_up);
+              std::function<void()> disconnect);
 
  private:
   const NetConfig& config_;
@@ -89,7 +91,7 @@ class Admission {
   struct Unread {
     std::string host;
     std::size_t bytes = 0;
-    std::function<void()> give_up;
+    std::function<void()> disconnect;
   };
   using UnreadMap = std::map<const void*, Unread>;
   /// The client to give up for `asking`; end(): there is no other.

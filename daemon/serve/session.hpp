@@ -76,9 +76,9 @@ class Session : public std::enable_shared_from_this<Session>, private Outbox::Ow
   [[nodiscard]] bool ready() const noexcept { return state_ == State::ready; }
   /// It said Hello, with a right token where one is needed, and there was room.
   [[nodiscard]] bool authenticated() const noexcept { return grant_.has_value(); }
-  /// It has not been let in, and may never be.
+  /// It is not authenticated, and may never be.
   [[nodiscard]] bool unauthenticated() const noexcept { return !grant_ && state_ != State::closed; }
-  /// Once it is greeted; before that it has the least.
+  /// Rights::view until it is authenticated.
   [[nodiscard]] Rights rights() const noexcept { return grant_ ? grant_->rights : Rights::view; }
   /// What the token file calls its token; empty where it needed none or it has no name.
   [[nodiscard]] std::string token_name() const { return grant_ ? grant_->name : std::string(); }
@@ -112,7 +112,7 @@ class Session : public std::enable_shared_from_this<Session>, private Outbox::Ow
   void deny(std::uint64_t id, const Admission::Verdict& verdict);
   /// Sends an error as the last answer and ends.
   void end_with(std::uint64_t id, int error_code, const std::string& sentence);
-  /// Of what the log says of this client.
+  /// The subject of log lines about this client.
   [[nodiscard]] LogSubject subject() const noexcept;
   std::shared_ptr<void> hold() override { return shared_from_this(); }
   void on_write_failed(const std::string& reason) override { close(reason); }

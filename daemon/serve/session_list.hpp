@@ -19,7 +19,7 @@ class SessionList {
 
   /// A new connection: it is started.
   void admit(const std::shared_ptr<Session>& session);
-  /// To every client that has been greeted and wants events.
+  /// To every authenticated client that wants events.
   void broadcast(const v1::ServerMessage& event) const;
   /// Removes a session that has ended. Null when it is not in the list. Not while iterating over
   /// all(), in which a session may end.

@@ -12,25 +12,29 @@
 namespace dtact::base {
 namespace {
 
-/// "VmLck:   1234 kB" of /proc/self/status, see proc(5).
-bool is_memory_locked() {
+/// A field of /proc/self/status, "VmLck" or the like, see proc(5); 0 where there is none.
+unsigned long long status_field(const std::string& name, int base) {
   std::ifstream status("/proc/self/status");
   for (std::string line; std::getline(status, line);) {
-    if (line.starts_with("VmLck:")) return line.find_first_of("123456789") != std::string::npos;
+    if (line.starts_with(name + ":"))
+      return std::stoull(line.substr(name.size() + 1), nullptr, base);
   }
-  return false;
+  return 0;
 }
 
-/// Locking again counts the whole address space against a finite limit, and could fail.
+/// Locking again counts the whole address space against the limit, and could fail.
 bool can_lock_again() {
+  constexpr unsigned long long kIpcLock = 1ULL << 14U;  // CAP_IPC_LOCK: no limit counts
   rlimit limit{};
-  return ::getrlimit(RLIMIT_MEMLOCK, &limit) == 0 && limit.rlim_cur == RLIM_INFINITY;
+  return (status_field("CapEff", 16) & kIpcLock) != 0 ||
+         (::getrlimit(RLIMIT_MEMLOCK, &limit) == 0 &&
+          (limit.rlim_cur == RLIM_INFINITY || status_field("VmSize", 10) * 1024 < limit.rlim_cur));
 }
 
 }  // namespace
 
 void release_free_memory() {
-  const bool locked = is_memory_locked();
+  const bool locked = status_field("VmLck", 10) > 0;
   if (locked && !can_lock_again()) return;
   if (locked) ::munlockall();
   (void)::malloc_trim(0);

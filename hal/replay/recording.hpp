@@ -37,10 +37,10 @@ struct Recording {
 /// Recordings that need more memory than this are refused (PNG: about 2,100 frames of 800×600).
 inline constexpr std::size_t kMaxBytes = std::size_t{1} << 30U;
 
-/// Reads the whole folder, or a file whose name ends in .mcap; of one that is not whole, what is
-/// there, its frames that are no JPEG of one size left out. Throws std::runtime_error naming the
-/// file (and line) and the fix: no frames, both
-/// kinds, different sizes, an unreadable file, too much memory, bad timestamps.
+/// Reads the whole folder, or a file whose name ends in .mcap. Of a damaged MCAP file it reads what
+/// is there and leaves out frames that are no JPEG of the first one's size. Throws
+/// std::runtime_error naming the file (and line) and the fix: no frames, both kinds, different
+/// sizes, an unreadable file, too much memory, bad timestamps.
 [[nodiscard]] Recording load_recording(const std::filesystem::path& path);
 
 /// Between the first and the last frame: a year. Longer ones are another unit, and would overflow.

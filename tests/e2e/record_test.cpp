@@ -142,7 +142,7 @@ TEST_F(Record, SigkillLosesTheOpenChunkOnly) {
                   &said),
       0)
       << said;
-  EXPECT_THAT(said, HasSubstr("not all of the recording could be read"));
+  EXPECT_THAT(said, HasSubstr("parts of the recording could not be read"));
 }
 
 TEST_F(Record, AFullDiskEndsTheRecordingAndNotTheDaemon) {
