@@ -1,0 +1,274 @@
+#include "clients/dds/graph.hpp"
+
+#include <arpa/inet.h>
+#include <fmt/format.h>
+#include <ifaddrs.h>
+#include <net/if.h>
+#include <sys/socket.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdlib>
+#include <filesystem>
+#include <iterator>
+#include <memory>
+#include <set>
+#include <stdexcept>
+#include <string_view>
+
+#include "clients/dds/ros2.h"
+#include "clients/dds/types.hpp"
+
+namespace dtact::dds {
+namespace {
+
+using QosPointer = std::unique_ptr<dds_qos_t, decltype(&dds_delete_qos)>;
+
+dds_entity_t checked(dds_entity_t entity, std::string_view what) {
+  if (entity >= 0) return entity;
+  throw std::runtime_error(fmt::format("DDS: {}: {}", what, dds_strretcode(entity)));
+}
+
+/// On this machine alone nothing is sent by multicast, and messages of up to 64 kB travel in one
+/// packet. Participants of this machine are asked for by unicast, as some do not listen to
+/// multicast.
+std::string settings_of(const Graph::Config& config) {
+  const bool local = config.interfaces.empty();
+  std::string interfaces;
+  for (const std::string& one : local ? own_addresses() : config.interfaces) {
+    const bool address = one.find_first_of(".:") != std::string::npos;
+    interfaces += fmt::format("<NetworkInterface {}=\"{}\"/>", address ? "address" : "name", one);
+  }
+  std::string peers = "<Peer address=\"127.0.0.1\"/>";
+  for (const std::string& one : config.peers) peers += fmt::format("<Peer address=\"{}\"/>", one);
+  return fmt::format(
+      "<CycloneDDS><Domain><General><Interfaces>{}</Interfaces>{}</General><Discovery>"
+      "<Peers>{}</Peers><ParticipantIndex>auto</ParticipantIndex>"
+      "<MaxAutoParticipantIndex>100</MaxAutoParticipantIndex>"
+      "<SPDPInterval>1 s</SPDPInterval></Discovery></Domain></CycloneDDS>",
+      interfaces,
+      local ? "<AllowMulticast>false</AllowMulticast><MaxMessageSize>65500B</MaxMessageSize>"
+              "<FragmentSize>63000B</FragmentSize>"
+            : "",
+      peers);
+}
+
+/// Cyclone receives on all interfaces, whichever it sends through. Lets only packets of this
+/// machine reach the sockets of this program that are bound to no address.
+void shut_out_the_network() {
+  for (const auto& entry : std::filesystem::directory_iterator("/proc/self/fd")) {
+    const int fd = std::atoi(entry.path().filename().c_str());
+    sockaddr_in bound{};
+    socklen_t size = sizeof bound;
+    if (::getsockname(fd, reinterpret_cast<sockaddr*>(&bound), &size) != 0) continue;
+    if (bound.sin_family != AF_INET || bound.sin_addr.s_addr != INADDR_ANY) continue;
+    // Doing it again needs a privilege.
+    std::array<char, IFNAMSIZ> device{};
+    size = device.size();
+    if (::getsockopt(fd, SOL_SOCKET, SO_BINDTODEVICE, device.data(), &size) == 0 && size > 0) {
+      continue;
+    }
+    if (::setsockopt(fd, SOL_SOCKET, SO_BINDTODEVICE, "lo", 2) != 0) {
+      throw std::runtime_error(
+          "DDS cannot be kept on this machine: that needs Linux 5.7; give --interface if others "
+          "may "
+          "subscribe");
+    }
+  }
+}
+
+QosPointer qos_of(Qos kind) {
+  QosPointer qos(dds_create_qos(), &dds_delete_qos);
+  dds_qset_history(qos.get(), DDS_HISTORY_KEEP_LAST, kind == Qos::command ? 10 : 1);
+  dds_qset_reliability(qos.get(), DDS_RELIABILITY_RELIABLE, 0);
+  dds_qset_durability(
+      qos.get(), kind == Qos::latched ? DDS_DURABILITY_TRANSIENT_LOCAL : DDS_DURABILITY_VOLATILE);
+  return qos;
+}
+
+/// Since ROS 2 Iron every endpoint says the hash of its type.
+void set_type_hash(dds_qos_t& qos, std::string_view type) {
+  const auto* known =
+      std::ranges::find_if(kTypes, [&](const Type& one) { return type == one.name; });
+  if (known == kTypes.end()) return;
+  const std::string text = fmt::format("typehash={};", known->hash);
+  dds_qset_userdata(&qos, text.data(), text.size());
+}
+
+dds_guid_t guid_of(dds_entity_t entity) {
+  dds_guid_t guid{};
+  checked(dds_get_guid(entity, &guid), "an identity is missing");
+  return guid;
+}
+
+/// The graph as a message. ROS 2 Humble fills a Gid of 24 bytes up with zeros.
+template <typename Info, typename NodeInfo, typename Gid>
+void write_graph(dds_entity_t writer, dds_entity_t participant, const std::vector<Node>& nodes) {
+  const auto gid = [](const dds_guid_t& guid) {
+    Gid made{};
+    std::ranges::copy(guid.v, std::begin(made.data));
+    return made;
+  };
+  std::vector<std::vector<Gid>> gids;
+  gids.reserve(2 * nodes.size());
+  const auto fill = [&](auto& sequence, const std::vector<dds_guid_t>& guids) {
+    std::vector<Gid>& made = gids.emplace_back();
+    std::ranges::transform(guids, std::back_inserter(made), gid);
+    sequence._length = sequence._maximum = static_cast<std::uint32_t>(made.size());
+    sequence._buffer = made.data();
+  };
+  std::vector<NodeInfo> infos(nodes.size());
+  for (std::size_t i = 0; i < nodes.size(); ++i) {
+    nodes[i].space.copy(infos[i].node_namespace, sizeof infos[i].node_namespace - 1);
+    nodes[i].name.copy(infos[i].node_name, sizeof infos[i].node_name - 1);
+    fill(infos[i].reader_gid_seq, nodes[i].readers);
+    fill(infos[i].writer_gid_seq, nodes[i].writers);
+  }
+  Info info{};
+  info.gid = gid(guid_of(participant));
+  info.node_entities_info_seq._length = static_cast<std::uint32_t>(infos.size());
+  info.node_entities_info_seq._maximum = info.node_entities_info_seq._length;
+  info.node_entities_info_seq._buffer = infos.data();
+  checked(dds_write(writer, &info), "the graph cannot be announced");
+}
+
+/// Humble's message under the name that it has there.
+dds_topic_descriptor_t humble_graph() {
+  const dds_topic_descriptor_t& made = rmw_dds_common_humble_msg_dds__ParticipantEntitiesInfo__desc;
+  return {made.m_size,
+          made.m_align,
+          made.m_flagset,
+          made.m_nkeys,
+          rmw_dds_common_msg_dds__ParticipantEntitiesInfo__desc.m_typename,
+          made.m_keys,
+          made.m_nops,
+          made.m_ops,
+          made.m_meta,
+          made.type_information,
+          made.type_mapping,
+          made.restrict_data_representation};
+}
+
+}  // namespace
+
+std::vector<std::string> own_addresses() {
+  std::vector<std::string> addresses{"127.0.0.1"};
+  ifaddrs* list = nullptr;
+  if (::getifaddrs(&list) != 0) return addresses;
+  const std::unique_ptr<ifaddrs, decltype(&::freeifaddrs)> owner(list, &::freeifaddrs);
+  std::set<std::string> interfaces;
+  for (const ifaddrs* one = list; one != nullptr && addresses.size() < 4; one = one->ifa_next) {
+    if (one->ifa_addr == nullptr || one->ifa_addr->sa_family != AF_INET) continue;
+    const auto flags = one->ifa_flags;
+    if ((flags & IFF_UP) == 0 || (flags & IFF_LOOPBACK) != 0) continue;
+    std::array<char, INET_ADDRSTRLEN> text{};
+    const auto* address = reinterpret_cast<const sockaddr_in*>(one->ifa_addr);
+    ::inet_ntop(AF_INET, &address->sin_addr, text.data(), text.size());
+    if (interfaces.insert(one->ifa_name).second) addresses.emplace_back(text.data());
+  }
+  return addresses;
+}
+
+Graph::Graph(const Config& config) : humble_(config.humble) {
+  domain_ = dds_create_domain(config.domain, settings_of(config).c_str());
+  if (domain_ < 0) {
+    throw std::runtime_error(fmt::format(
+        "DDS: domain {} cannot be opened on {}: {}. Does the interface exist and have an address "
+        "(ip address)? A domain is 0 to 232",
+        config.domain,
+        config.interfaces.empty() ? "this machine"
+                                  : fmt::format("{}", fmt::join(config.interfaces, ", ")),
+        dds_strretcode(domain_)));
+  }
+  // Both make sockets.
+  if (config.interfaces.empty()) shut_out_the_network();
+  const QosPointer qos(dds_create_qos(), &dds_delete_qos);
+  constexpr std::string_view kEnclave = "enclave=/;";
+  dds_qset_userdata(qos.get(), kEnclave.data(), kEnclave.size());
+  participant_ =
+      checked(dds_create_participant(config.domain, qos.get(), nullptr), "no participant");
+  if (config.interfaces.empty()) shut_out_the_network();
+  static const dds_topic_descriptor_t kHumble = humble_graph();
+  const dds_topic_descriptor_t& type =
+      humble_ ? kHumble : rmw_dds_common_msg_dds__ParticipantEntitiesInfo__desc;
+  const QosPointer latched = qos_of(Qos::latched);
+  if (!humble_) set_type_hash(*latched, type.m_typename);
+  discovery_ = checked(
+      dds_create_writer(participant_, topic("ros_discovery_info", type), latched.get(), nullptr),
+      "no writer of ros_discovery_info");
+  readers_ = make_waitset();
+}
+
+Graph::~Graph() { dds_delete(domain_); }
+
+std::size_t Graph::add_node(const std::string& space, const std::string& name) {
+  nodes_.push_back({space, name});
+  return nodes_.size() - 1;
+}
+
+dds_entity_t Graph::topic(const std::string& name, const dds_topic_descriptor_t& type) const {
+  return checked(dds_create_topic(participant_, &type, name.c_str(), nullptr, nullptr), name);
+}
+
+dds_entity_t Graph::add_writer(std::size_t node, const std::string& name,
+                               const dds_topic_descriptor_t& type, Qos kind) {
+  const QosPointer qos = qos_of(kind);
+  if (!humble_) set_type_hash(*qos, type.m_typename);
+  const dds_entity_t writer =
+      checked(dds_create_writer(participant_, topic("rt" + name, type), qos.get(), nullptr), name);
+  nodes_[node].writers.push_back(guid_of(writer));
+  published_.push_back({name, &type, kind});
+  return writer;
+}
+
+dds_entity_t Graph::add_reader(std::size_t node, const std::string& name,
+                               const dds_topic_descriptor_t& type) {
+  const QosPointer qos = qos_of(Qos::command);
+  const dds_entity_t reader = make_reader(name, type, *qos, readers_);
+  nodes_[node].readers.push_back(guid_of(reader));
+  return reader;
+}
+
+dds_entity_t Graph::make_reader(const std::string& name, const dds_topic_descriptor_t& type,
+                                dds_qos_t& qos, dds_entity_t waitset) const {
+  if (!humble_) set_type_hash(qos, type.m_typename);
+  const dds_entity_t reader =
+      checked(dds_create_reader(participant_, topic("rt" + name, type), &qos, nullptr), name);
+  checked(dds_set_status_mask(reader, DDS_DATA_AVAILABLE_STATUS), name);
+  checked(dds_waitset_attach(waitset, reader, reader), name);
+  return reader;
+}
+
+dds_entity_t Graph::make_waitset() const {
+  return checked(dds_create_waitset(participant_), "no waitset");
+}
+
+dds_entity_t Graph::subscribe(const Published& to, dds_entity_t waitset) const {
+  const QosPointer qos = qos_of(to.qos);
+  dds_qset_history(qos.get(), DDS_HISTORY_KEEP_LAST, 100);
+  return make_reader(to.topic, *to.type, *qos, waitset);
+}
+
+void Graph::announce() const {
+  if (humble_) {
+    write_graph<rmw_dds_common_humble_msg_dds__ParticipantEntitiesInfo_,
+                rmw_dds_common_humble_msg_dds__NodeEntitiesInfo_,
+                rmw_dds_common_humble_msg_dds__Gid_>(discovery_, participant_, nodes_);
+  } else {
+    write_graph<rmw_dds_common_msg_dds__ParticipantEntitiesInfo_,
+                rmw_dds_common_msg_dds__NodeEntitiesInfo_, rmw_dds_common_msg_dds__Gid_>(
+        discovery_, participant_, nodes_);
+  }
+}
+
+void Graph::wait(std::chrono::milliseconds limit) const {
+  checked(dds_waitset_wait(readers_, nullptr, 0, DDS_MSECS(limit.count())), "waiting");
+}
+
+bool has_subscriber(dds_entity_t writer) {
+  dds_publication_matched_status_t status{};
+  return dds_get_publication_matched_status(writer, &status) == DDS_RETCODE_OK &&
+         status.current_count > 0;
+}
+
+}  // namespace dtact::dds

@@ -1,0 +1,101 @@
+#include "clients/dds/recorder.hpp"
+
+#include <dds/ddsi/ddsi_serdata.h>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <string_view>
+#include <utility>
+
+#include "clients/dds/sensor.hpp"
+#include "clients/dds/types.hpp"
+#include "version.hpp"
+
+namespace dtact::dds {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+/// "sensor_msgs::msg::dds_::Image_" → "sensor_msgs/msg/Image".
+std::string ros_name(std::string name) {
+  constexpr std::string_view kMiddle = "::msg::dds_::";
+  name.replace(name.find(kMiddle), kMiddle.size(), "/msg/");
+  name.pop_back();
+  return name;
+}
+
+}  // namespace
+
+Recorder::Recorder(Graph& graph, const std::filesystem::path& file, bool replace)
+    : sink_(file, replace),
+      writer_(sink_, {.library = "dtact-dds " DTACT_VERSION, .profile = "ros2"}),
+      waitset_(graph.make_waitset()) {
+  std::map<std::string, std::uint16_t> schemas;
+  for (const Graph::Published& one : graph.published()) {
+    if (one.topic.ends_with("/result")) continue;
+    const auto* type = std::ranges::find_if(kTypes, [&](const Type& known) {
+      return std::string_view(one.type->m_typename) == known.name;
+    });
+    auto& schema = schemas[type->name];
+    if (schema == 0) {
+      schema = writer_.add_schema(ros_name(type->name), "ros2msg", type->definition);
+    }
+    const dds_entity_t reader = graph.subscribe(one, waitset_);
+    channels_[reader] =
+        writer_.add_channel(schema, one.topic, "cdr", {{"topic_type_hash", type->hash}});
+  }
+  thread_ = std::thread([this] { run(); });
+}
+
+Recorder::~Recorder() {
+  ending_ = true;
+  if (thread_.joinable()) thread_.join();
+  for (const auto& [reader, _] : channels_) dds_delete(reader);
+}
+
+std::uint64_t Recorder::finish() {
+  ending_ = true;
+  thread_.join();
+  try {
+    writer_.finish();
+  } catch (...) {
+    if (!failure_) throw;  // else the first one says more
+  }
+  if (failure_) std::rethrow_exception(failure_);
+  return messages_;
+}
+
+void Recorder::run() {
+  try {
+    auto flushed = Clock::now();
+    while (!ending_) {
+      (void)dds_waitset_wait(waitset_, nullptr, 0, DDS_MSECS(100));
+      for (const auto& [reader, channel] : channels_) take(reader, channel);
+      if (Clock::now() - flushed < std::chrono::seconds(1)) continue;
+      flushed = Clock::now();
+      writer_.flush();
+    }
+  } catch (...) {
+    failure_ = std::current_exception();
+    failed_ = true;
+  }
+}
+
+void Recorder::take(dds_entity_t reader, std::uint16_t channel) {
+  for (;;) {
+    ddsi_serdata* message = nullptr;
+    dds_sample_info_t info{};
+    if (dds_takecdr(reader, &message, 1, &info, DDS_ANY_STATE) <= 0) return;
+    if (info.valid_data) {
+      buffer_.resize(ddsi_serdata_size(message));
+      ddsi_serdata_to_ser(message, 0, buffer_.size(), buffer_.data());
+    }
+    ddsi_serdata_unref(message);
+    if (!info.valid_data) continue;
+    writer_.add(mcap::Message{channel, messages_++, static_cast<std::uint64_t>(ros_now()),
+                              static_cast<std::uint64_t>(info.source_timestamp), buffer_});
+  }
+}
+
+}  // namespace dtact::dds

@@ -1,0 +1,49 @@
+#pragma once
+
+#include <dds/dds.h>
+
+#include <atomic>
+#include <exception>
+#include <filesystem>
+#include <map>
+#include <thread>
+
+#include "clients/dds/graph.hpp"
+#include "hal/files/mcap_writer.hpp"
+
+namespace dtact::dds {
+
+/// Subscribes to all that a graph publishes, as a node would, and writes it as rosbag2 does: an
+/// MCAP file of serialized messages with their definitions, which `ros2 bag` and Foxglove read. On
+/// a thread of its own.
+class Recorder {
+ public:
+  /// Of the topics that `graph` has by now. `replace`: a file of that name is replaced; else it is
+  /// an error. `graph` must outlive this.
+  Recorder(Graph& graph, const std::filesystem::path& file, bool replace);
+  ~Recorder();
+  Recorder(const Recorder&) = delete;
+  Recorder& operator=(const Recorder&) = delete;
+
+  /// The file could not be written; finish() throws why.
+  [[nodiscard]] bool failed() const noexcept { return failed_; }
+  /// Closes the file, also after a failure, and returns the number of messages.
+  std::uint64_t finish();
+
+ private:
+  void run();
+  void take(dds_entity_t reader, std::uint16_t channel);
+
+  mcap::FileSink sink_;
+  mcap::Writer writer_;
+  dds_entity_t waitset_;
+  std::map<dds_entity_t, std::uint16_t> channels_;  ///< By reader.
+  std::string buffer_;
+  std::uint32_t messages_ = 0;
+  std::atomic<bool> ending_ = false;
+  std::atomic<bool> failed_ = false;
+  std::exception_ptr failure_;  ///< Of the thread, until it has ended.
+  std::thread thread_;
+};
+
+}  // namespace dtact::dds
