@@ -1,52 +1,15 @@
 #include "clients/perceive/depth_crop.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 
-#include "clients/cpp/errors.hpp"
-#include "clients/cpp/maps.hpp"
-#include "daemon/recon/rectify.hpp"
-#include "proto/dtact.pb.h"
+#include "clients/common/depth_message.hpp"
 
 namespace dtact::perceive {
 
-namespace {
-
-/// Like client::values_of(), which checks only the values. Throws client::ProtocolError also where
-/// the map contradicts itself.
-std::vector<std::int16_t> values_of(const v1::DepthMap& map) {
-  const std::uint64_t full_width = map.full_width();
-  const std::uint64_t full_height = map.full_height();
-  const bool inside = std::uint64_t{map.x()} + map.width() <= full_width &&
-                      std::uint64_t{map.y()} + map.height() <= full_height;
-  const bool scaled = map.mm_per_px() > 0 && std::isfinite(map.mm_per_px()) &&
-                      map.um_per_unit() > 0 && std::isfinite(map.um_per_unit());
-  if (inside && scaled && full_width * full_height <= std::uint64_t{recon::kMaxMapPixels}) {
-    return client::values_of(map);
-  }
-  throw client::ProtocolError(fmt::format(
-      "a depth map of {}x{} pixels at {}, {} of {}x{}, {} mm a pixel and {} um a unit contradicts "
-      "itself: check the daemon's version",
-      map.width(), map.height(), map.x(), map.y(), full_width, full_height, map.mm_per_px(),
-      map.um_per_unit()));
-}
-
-}  // namespace
-
 DepthCrop::DepthCrop(const v1::DepthMap& map)
-    : values_(values_of(map)),
-      whole_{.x = static_cast<int>(map.x()),
-             .y = static_cast<int>(map.y()),
-             .width = static_cast<int>(map.width()),
-             .height = static_cast<int>(map.height()),
-             .full_width = static_cast<int>(map.full_width()),
-             .full_height = static_cast<int>(map.full_height()),
-             .mm_per_px = map.mm_per_px(),
-             .um_per_unit = map.um_per_unit(),
-             .untrusted = map.untrusted_value(),
-             .values = values_},
+    : values_(cli::depths_of(map)),
+      whole_(cli::grid_of(map, values_)),
       decimation_(std::max(1, static_cast<int>(map.decimation()))) {}
 
 std::optional<DepthGrid> DepthCrop::crop(int left, int top, int right, int bottom) {

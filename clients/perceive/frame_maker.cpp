@@ -35,7 +35,7 @@ std::uint32_t timed(Work work) {
 
 }  // namespace
 
-void FrameMaker::begin(v1::Frame frame, bool pose) {
+void FrameMaker::begin(v1::Frame frame, Wanted wanted) {
   done_.clear();
   depth_.reset();
   pose_.reset();
@@ -44,11 +44,20 @@ void FrameMaker::begin(v1::Frame frame, bool pose) {
   frame_.clear_dropped();
   if (frame_.has_depth()) {
     if (frame_.contact().in_contact()) depth_.emplace(frame_.depth());
+    mm_per_px_ = frame_.depth().mm_per_px() / std::max(1U, frame_.depth().decimation());
     follow_sensor();
   }
   const bool gone = frame_.has_contact() && !frame_.contact().in_contact();
-  if (!pose || gone) release();
-  if (pose && depth_) follow(*depth_, frame_.depth().uncertainty_um());
+  if (gone) release();
+  if (!wanted.pose) release_pose();
+  if (wanted.pose && depth_) follow(*depth_, frame_.depth().uncertainty_um());
+  // A first map may be coarser than the network's; the next one is not.
+  const bool fine =
+      frame_.depth().decimation() <= 1 || frame_.depth().mm_per_px() <= TouchMap::kCellMm;
+  if (wanted.recognition && depth_ && depth_->is_whole() && fine) {
+    if (!recognition_) recognition_ = std::make_unique<RecognitionThread>(taught_);
+    recognition_->offer(depth_->whole(), frame_.sequence());
+  }
   frame_.clear_depth();
 }
 
@@ -64,6 +73,11 @@ void FrameMaker::follow_sensor() {
 }
 
 void FrameMaker::release() {
+  release_pose();
+  if (recognition_) recognition_->release();
+}
+
+void FrameMaker::release_pose() {
   tracker_.release();
   if (object_) object_->release();
 }
@@ -73,7 +87,8 @@ void FrameMaker::follow(DepthCrop& depth, double uncertainty_um) {
   if (!grid) return;
   const std::uint32_t took = timed([&] {
     clouds_.make(*grid, 1, contact_);
-    const ContactView view(*grid, contact_, clouds_.table(), uncertainty_um);
+    const ContactView view(*grid, contact_, clouds_.table(), uncertainty_um,
+                           clouds_.surface().view);
     if (object_) {
       (void)object_->follow(view, frame_.sequence());
     } else {
@@ -111,6 +126,10 @@ std::shared_ptr<const net::EncodedFrame> FrameMaker::make(const net::FrameKind& 
   if (kind.cloud != v1::CLOUD_NONE && depth_) add_cloud(*depth_, kind, *message.mutable_cloud());
   if (message.cloud().points() == 0) message.clear_cloud();
   if (kind.pose && pose_) *message.mutable_pose() = *pose_;
+  if (kind.recognition > 0 && recognition_ && frame_.contact().in_contact() &&
+      !recognition_->fill(kind.recognition, *message.mutable_recognition())) {
+    message.clear_recognition();
+  }
   auto encoded = std::make_shared<net::EncodedFrame>();
   if (message.ByteSizeLong() > kMaxBody) {
     encoded.reset();

@@ -10,6 +10,7 @@
 
 #include "clients/common/listen_options.hpp"
 #include "clients/perceive/object_file.hpp"
+#include "clients/perceive/recognition/taught_objects.hpp"
 #include "clients/perceive/server.hpp"
 #include "clients/perceive/watch.hpp"
 #include "daemon/serve/net_config.hpp"
@@ -22,6 +23,7 @@ struct Settings {
   net::NetConfig net;
   std::string object;  ///< A file; none: empty.
   std::string object_unit = "mm";
+  std::string taught;  ///< A folder; none: empty.
 };
 
 void serve(const cli::Context& context, const Settings& settings) {
@@ -46,8 +48,17 @@ void serve(const cli::Context& context, const Settings& settings) {
                               object->name, 1e3 * kCoarse)});
     }
   }
+  if (!settings.taught.empty()) {
+    Network network;
+    const auto taught = load_taught(network, settings.taught);
+    config.log({net::LogLevel::info,
+                fmt::format("{} taught objects in {}", taught.objects.size(), settings.taught)});
+    for (const std::string& sentence : taught.damaged) {
+      config.log({net::LogLevel::warning, sentence});
+    }
+  }
   boost::asio::io_context io;
-  const auto server = std::make_shared<Server>(io, config, context.target, object);
+  const auto server = std::make_shared<Server>(io, config, context.target, object, settings.taught);
   for (const std::string& address : server->addresses()) {
     config.log({net::LogLevel::info, "listening on " + address});
   }
@@ -85,6 +96,11 @@ void add_serve(CLI::App& app, cli::Context& context) {
   command->add_option("--object-unit", settings->object_unit, "Of the lengths in that file")
       ->check(CLI::IsMember({"mm", "m"}))
       ->capture_default_str();
+  command
+      ->add_option("--taught", settings->taught,
+                   "Folder of objects to recognise beside the built-in ones, which dtact-calibrate "
+                   "objects teaches; read again when it changes")
+      ->type_name("FOLDER");
   command->callback([&context, settings] { serve(context, *settings); });
 }
 

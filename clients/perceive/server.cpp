@@ -15,8 +15,12 @@ namespace asio = boost::asio;
 using net::Subscription;
 
 Server::Server(asio::io_context& io, net::NetConfig config, client::Options daemon,
-               const std::shared_ptr<const ObjectModel>& object)
-    : io_(io), listeners_(io, std::move(config)), maker_(object), daemon_(std::move(daemon)) {}
+               const std::shared_ptr<const ObjectModel>& object,
+               const std::filesystem::path& taught)
+    : io_(io),
+      listeners_(io, std::move(config)),
+      maker_(object, taught),
+      daemon_(std::move(daemon)) {}
 
 void Server::start() {
   const auto weak = weak_from_this();
@@ -61,7 +65,7 @@ void Server::on_frame() {
   const std::int64_t timestamp_ns = taken->frame.monotonic_ns();
   if (taken->parted) maker_.release();
   try {
-    maker_.begin(std::move(taken->frame), pose_wanted_);
+    maker_.begin(std::move(taken->frame), extras_);
   } catch (const client::ProtocolError& e) {
     return listeners_.config().log({net::LogLevel::warning, e.what()});
   }
@@ -70,17 +74,19 @@ void Server::on_frame() {
     if (!kind) continue;
     if (auto encoded = maker_.make(*kind)) session->send_frame(std::move(encoded));
   }
-  if (maker_.frame().contact().in_contact() == in_contact_) return;
-  in_contact_ = !in_contact_;
+  const bool in_contact = maker_.frame().contact().in_contact();
+  if (in_contact == in_contact_ && maker_.mm_per_px() == mm_per_px_) return;
+  in_contact_ = in_contact;
+  mm_per_px_ = maker_.mm_per_px();
   update_want();
 }
 
 void Server::update_want() {
-  UpstreamSubscription demand(in_contact_);
+  UpstreamSubscription demand(in_contact_, mm_per_px_);
   for (const auto& session : session_list_.all()) {
     if (session->ready()) demand.add(session->subscription());
   }
-  pose_wanted_ = demand.pose();
+  extras_ = {.pose = demand.pose(), .recognition = demand.recognition()};
   const v1::Subscribe wanted = demand.subscription();
   if (upstream_ == nullptr || wanted.SerializeAsString() == wanted_.SerializeAsString()) return;
   wanted_ = wanted;

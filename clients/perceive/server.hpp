@@ -3,6 +3,7 @@
 #include <boost/asio/io_context.hpp>
 #include <chrono>
 #include <cstdint>
+#include <filesystem>
 #include <memory>
 #include <string>
 #include <vector>
@@ -18,10 +19,11 @@ namespace dtact::perceive {
 /// connection to the daemon is on the thread that runs `io`.
 class Server : public net::SessionHost, public std::enable_shared_from_this<Server> {
  public:
-  /// Listens from here on; `object` as FrameMaker takes it. Throws std::runtime_error naming the
-  /// setting, address or port and the fix.
+  /// Listens from here on; `object` and `taught` as FrameMaker takes them. Throws
+  /// std::runtime_error naming the setting, address or port and the fix.
   Server(boost::asio::io_context& io, net::NetConfig config, client::Options daemon,
-         const std::shared_ptr<const ObjectModel>& object = nullptr);
+         const std::shared_ptr<const ObjectModel>& object = nullptr,
+         const std::filesystem::path& taught = {});
 
   void start();
   void stop();
@@ -54,8 +56,9 @@ class Server : public net::SessionHost, public std::enable_shared_from_this<Serv
   std::unique_ptr<Upstream> upstream_;
   client::Options daemon_;
   v1::Subscribe wanted_;
-  bool pose_wanted_ = false;
-  bool in_contact_ = false;  ///< In the last frame.
+  FrameMaker::Wanted extras_;  ///< What clients need beside points.
+  bool in_contact_ = false;    ///< In the last frame.
+  double mm_per_px_ = 0;       ///< Of the last whole map.
   std::uint64_t frames_ = 0;
   std::uint64_t skipped_ = 0;
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "clients/perceive/recognition/touch_map.hpp"
+
 namespace dtact::perceive {
 
 using net::Subscription;
@@ -12,6 +14,12 @@ void UpstreamSubscription::add(const Subscription& subscription) {
   if ((parts & Subscription::kPose) != 0) {
     pose_ = depth_ = true;
     decimation_ = 1;
+  }
+  if ((parts & Subscription::kRecognition) != 0) {
+    recognition_ = true;
+    depth_ |= in_contact_;
+    whole_ |= in_contact_;
+    while (decimation_ > 1 && decimation_ * mm_per_px_ > TouchMap::kCellMm) decimation_ /= 2;
   }
   if ((parts & Subscription::kCloud) == 0) return;
   const net::FrameKind kind = subscription.kind(Subscription::kCloud);

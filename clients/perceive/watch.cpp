@@ -21,6 +21,7 @@ v1::Subscribe wanted() {
   subscription.set_cloud(v1::CLOUD_INT16);
   subscription.set_contact_box(true);
   subscription.set_pose(true);
+  subscription.set_recognition(true);
   subscription.set_events(false);
   return subscription;
 }
@@ -60,6 +61,27 @@ std::string words_of(const v1::ObjectPose& pose) {
   return line;
 }
 
+/// "  nut (94 %)", "  an unknown object", "  bolt (51 %) or cylinder (45 %)".
+std::string words_of(const v1::Recognition& found) {
+  const auto candidate = [&](int i) {
+    const auto& one = found.candidates(i);
+    return fmt::format("{} ({:.0f} %)", one.name(), 100 * one.probability());
+  };
+  switch (found.verdict()) {
+    case v1::Recognition::UNKNOWN:
+      return "  an unknown object";
+    case v1::Recognition::TOO_SHALLOW:
+      return "  too shallow to recognise";
+    case v1::Recognition::CUT_OFF:
+      return "  too far outside the map to recognise";
+    default:
+      break;
+  }
+  if (found.candidates_size() < 2) return "";
+  if (found.verdict() == v1::Recognition::KNOWN) return "  " + candidate(0);
+  return fmt::format("  {} or {}", candidate(0), candidate(1));
+}
+
 /// "  1.20 N +- 0.03", "  force not calibrated".
 std::string force_words(const v1::Contact& contact) {
   if (!contact.has_force_n()) return "  force not calibrated";
@@ -72,6 +94,7 @@ std::string line_of(const v1::Frame& frame, double fps) {
   std::string line = fmt::format("{:.1f} fps", fps);
   if (!frame.contact().in_contact()) return line + "  there is no contact\n";
   line += force_words(frame.contact());
+  if (frame.has_recognition()) line += words_of(frame.recognition());
   if (frame.has_cloud()) {
     line += fmt::format("  {} points in {:.2f} ms", frame.cloud().points(),
                         frame.cloud().make_ns() * 1e-6);
@@ -112,10 +135,10 @@ void watch(const cli::Context& context, double seconds) {
 }  // namespace
 
 void add_watch(CLI::App& app, cli::Context& context) {
-  auto* command = app.add_subcommand(
-      "watch",
-      "Show a running dtact-perceive's rate, points, pose and the force, a line a second, until "
-      "Ctrl-C; without --port its own port, 7378");
+  auto* command = app.add_subcommand("watch",
+                                     "Show a running dtact-perceive's rate, points, pose, "
+                                     "recognised object and the force, a line a second, until "
+                                     "Ctrl-C; without --port its own port, 7378");
   const auto seconds = std::make_shared<double>(0);
   command->add_option("--seconds", *seconds, "End by itself after so long")->check(cli::positive());
   cli::add_json_option(*command, context);

@@ -24,14 +24,15 @@ constexpr double kHollow = 250;
 using Eigen::Vector3d;
 
 ContactView::ContactView(const DepthGrid& depth, const PointCloud& cloud, const SurfaceTable* table,
-                         double uncertainty_um)
+                         double uncertainty_um, const recon::Viewpoint& view)
     : depth_(depth),
       cloud_(cloud),
       table_(table),
       px_(depth.mm_per_px * 1e-3),
       x0_((depth.x - 0.5 * (depth.full_width - 1)) * px_),
       y0_((depth.y - 0.5 * (depth.full_height - 1)) * px_),
-      uncertainty_(1e-6 * uncertainty_um) {
+      uncertainty_(1e-6 * uncertainty_um),
+      view_(view) {
   for (std::size_t i = 0; i < cloud.size(); ++i) {
     if (this->depth(i) > deepest_) deepest_ = this->depth(i);
   }
@@ -64,8 +65,9 @@ Vector3d ContactView::upright_at(int column, int row) const {
 }
 
 std::optional<ContactView::Sample> ContactView::at(const Vector3d& point_m) const {
-  double column = (point_m.x() - x0_) / px_;
-  double row = (point_m.y() - y0_) / px_;
+  const recon::Point seen = view_.seen({1e3 * point_m.x(), 1e3 * point_m.y()}, -1e3 * point_m.z());
+  double column = (1e-3 * seen.x - x0_) / px_;
+  double row = (1e-3 * seen.y - y0_) / px_;
   Vector3d upright = Vector3d::UnitZ();
   if (table_ != nullptr) {
     const auto projection = project_to_surface(*table_, {point_m.x(), point_m.y(), point_m.z()});

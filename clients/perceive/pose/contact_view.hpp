@@ -23,10 +23,12 @@ struct Surfel {
 /// the gel's shoulders beside it, which move with the object.
 class ContactView {
  public:
-  /// `cloud` is what a CloudMaker makes of `depth` at stride 1, `table` its table (null: a plane);
-  /// both must outlive the view. `uncertainty_um`: of the depth, as the frame states it.
+  /// `cloud` is what a CloudMaker makes of `depth` at stride 1, `table` its table
+  /// (null: a plane, which
+  /// `view` says where the camera sees from); both must outlive the view. `uncertainty_um`: of the
+  /// depth, as the frame states it.
   ContactView(const DepthGrid& depth, const PointCloud& cloud, const SurfaceTable* table,
-              double uncertainty_um);
+              double uncertainty_um, const recon::Viewpoint& view = {});
 
   struct Sample {
     Eigen::Vector3d point = Eigen::Vector3d::Zero();     ///< Point of the gel, metres.
@@ -35,7 +37,7 @@ class ContactView {
     double depth = 0;  ///< The gel's depth, metres, positive = pressed.
     double below = 0;  ///< How deep the point asked for lies below the undeformed surface, metres.
   };
-  /// The gel where the undeformed surface's normal through `point` (metres) crosses it.
+  /// The gel where the camera's ray through `point` (metres) meets it.
   /// Interpolated between four pixels; nothing outside the map and where a pixel is untrusted.
   [[nodiscard]] std::optional<Sample> at(const Eigen::Vector3d& point) const;
 
@@ -86,6 +88,7 @@ class ContactView {
   double x0_;  ///< x of the first column, of a plane.
   double y0_;
   double uncertainty_;
+  recon::Viewpoint view_;  ///< Of a plane.
   Eigen::Vector3d centre_ = Eigen::Vector3d::Zero();
   Eigen::Vector3d upright_ = Eigen::Vector3d::Zero();
   std::size_t pixels_ = 0;

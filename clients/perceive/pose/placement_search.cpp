@@ -18,7 +18,7 @@ using Eigen::Vector3d;
 constexpr int kDirections = 1600;
 constexpr int kTurns = 36;
 /// Turns of a direction that are looked at more closely.
-constexpr std::size_t kTurnsKept = 2;
+constexpr std::size_t kTurnsKept = 4;
 /// Samples of the core for a first impression, and the limit of their distances, metres; for a
 /// closer look.
 constexpr std::size_t kFirstSamples = 60;

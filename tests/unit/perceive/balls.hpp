@@ -68,17 +68,18 @@ inline Motion moved(const Eigen::Vector3d& mm,
          Motion(Eigen::AngleAxisd(degrees * M_PI / 180, axis.normalized()));
 }
 
-/// Indentation of the balls after `motion` along a surface's normal, millimetres.
+/// Indentation of the balls after `motion` where the camera's ray meets them, millimetres.
 inline double indentation_mm(const Balls& object, const Motion& motion, const SurfacePoint& at) {
-  const Eigen::Vector3d normal(at.normal.data());
+  const Eigen::Vector3d ray(at.ray.data());
   double depth = 0;
   for (const auto& ball : object.balls) {
-    // The normal leaves the ball here, going inwards.
+    // The ray leaves the ball here, going inwards.
     const Eigen::Vector3d from =
         1e3 * (Eigen::Vector3d(at.point.data()) - motion * (1e-3 * ball.middle));
-    const double over = from.dot(normal);
-    const double rest = over * over - from.squaredNorm() + ball.radius * ball.radius;
-    if (rest > 0) depth = std::max(depth, over + std::sqrt(rest));
+    const double over = from.dot(ray);
+    const double rest =
+        over * over - ray.squaredNorm() * (from.squaredNorm() - ball.radius * ball.radius);
+    if (rest > 0) depth = std::max(depth, (over + std::sqrt(rest)) / ray.squaredNorm());
   }
   return depth;
 }

@@ -43,7 +43,7 @@ v1::Frame nothing(std::uint64_t sequence) {
 }
 
 ObjectPose pose_of(FrameMaker& maker, v1::Frame frame) {
-  maker.begin(std::move(frame), true);
+  maker.begin(std::move(frame), {.pose = true});
   net::FrameKind kind;
   kind.pose = true;
   v1::Frame made;
@@ -87,7 +87,7 @@ TEST(FrameMakerOfAnObject, SearchesFindsAndFollowsInEachContact) {
     EXPECT_NEAR(pose.translation_mm().z(), 0, 0.03);
     EXPECT_NEAR(pose.rotation_deg().z(), 60, 1);
 
-    maker.begin(nothing(++sequence), true);
+    maker.begin(nothing(++sequence), {.pose = true});
     net::FrameKind kind;
     kind.pose = true;
     v1::Frame made;

@@ -114,6 +114,8 @@ TEST(SearchPlacement, FindsBumpsWhereverTheyAre) {
   for (const recon::Surface& surface : surfaces) {
     for (const Motion& truth :
          {moved({0.3, -0.2, 0}, Vector3d::UnitZ(), 100), moved({0, 0, 0}, {0.03, -0.02, 1}, -40)}) {
+      SCOPED_TRACE(testing::Message()
+                   << "radius " << surface.radius_mm << ", at " << truth.translation().transpose());
       const Frame frame(bumps(), truth, 5, 1, surface);
       const ContactPatch patch = make_patch(frame.view());
       const auto found = search(*model, patch);

@@ -168,7 +168,7 @@ v1::Frame made(FrameMaker& maker, const net::FrameKind& kind) {
 
 TEST(FrameMaker, SendsWhatIsDueAndTheSameBufferToEveryone) {
   FrameMaker maker;
-  maker.begin(frame_of(true), false);
+  maker.begin(frame_of(true), {});
   net::FrameKind points;
   points.cloud = v1::CLOUD_FLOAT32;
   const v1::Frame frame = made(maker, points);
@@ -183,11 +183,25 @@ TEST(FrameMaker, SendsWhatIsDueAndTheSameBufferToEveryone) {
   EXPECT_EQ(made(maker, points).cloud().width(), 2U);
 }
 
+TEST(FrameMaker, RecognisesOnlyOnRequestAndDuringContact) {
+  FrameMaker maker;
+  net::FrameKind wanted;
+  wanted.recognition = 1;
+  maker.begin(frame_of(true), {});
+  EXPECT_FALSE(made(maker, wanted).has_recognition());
+  maker.begin(frame_of(true), {.recognition = true});
+  maker.wait();
+  EXPECT_EQ(made(maker, wanted).recognition().verdict(), v1::Recognition::TOO_SHALLOW);
+  EXPECT_FALSE(made(maker, {}).has_recognition());
+  maker.begin(frame_of(false), {.recognition = true});
+  EXPECT_FALSE(made(maker, wanted).has_recognition());
+}
+
 TEST(FrameMaker, OfAPartOfTheMapThereAreNoPointsOfAll) {
   FrameMaker maker;
   v1::Frame part = frame_of(true);
   *part.mutable_depth() = map_of({0, 1, 2, 3, 10, 11, 12, 13, 20, 21, 22, 23});
-  maker.begin(part, false);
+  maker.begin(part, {});
   net::FrameKind points;
   points.cloud = v1::CLOUD_FLOAT32;
   EXPECT_FALSE(made(maker, points).has_cloud());
@@ -207,7 +221,7 @@ TEST(FrameMaker, PointsThatDoNotFitAMessageAreMadeCoarser) {
   map.set_full_width(kSide);
   map.set_full_height(kSide);
   map.set_data(std::string(2 * kSide * kSide, '\0'));
-  maker.begin(frame, false);
+  maker.begin(frame, {});
   net::FrameKind points;
   points.cloud = v1::CLOUD_INT16;
   EXPECT_EQ(made(maker, points).cloud().decimation(), 1U);
@@ -219,7 +233,7 @@ TEST(FrameMaker, PointsThatDoNotFitAMessageAreMadeCoarser) {
 
 TEST(FrameMaker, WithoutContactNoPoints) {
   FrameMaker maker;
-  maker.begin(frame_of(false), true);
+  maker.begin(frame_of(false), {.pose = true});
   net::FrameKind all;
   all.cloud = v1::CLOUD_FLOAT32;
   all.pose = true;
@@ -238,7 +252,7 @@ TEST(FrameMaker, KnowsACurvedSurface) {
   surface.set_air_mm(20);
   surface.set_gel_mm(5);
   surface.set_refraction(1.41);
-  maker.begin(bent, true);
+  maker.begin(bent, {.pose = true});
   net::FrameKind all;
   all.cloud = v1::CLOUD_FLOAT32;
   all.contact_box = true;

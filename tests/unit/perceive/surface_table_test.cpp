@@ -21,6 +21,29 @@ TEST(CastRay, APlaneIsTheMapItself) {
   expect_near(found->normal, {0, 0, 1}, 0);
 }
 
+TEST(CastRay, OnAPlaneSeenFromNearTheRayLeansAwayFromTheAxis) {
+  const recon::Surface surface{.view = {{1, -1}, 0.04}};
+  const auto found = cast_ray(surface, 6, -4);
+  ASSERT_TRUE(found.has_value());
+  expect_near(found->point, {6e-3, -4e-3, 0}, 1e-15);
+  expect_near(found->ray, {0.2, -0.12, 1}, 1e-15);
+}
+
+TEST(CastRay, PointsBelowASphereLieOnTheRay) {
+  const recon::Surface sphere{Kind::sphere, 12, 0, 20, 5, 1};
+  const auto found = cast_ray(sphere, 3, -2);
+  ASSERT_TRUE(found.has_value());
+  // The camera is at (0, 0, −25) and sees (3, −2, 0).
+  const Vector below = along(found->point, -0.8e-3, found->ray);
+  EXPECT_NEAR(below[0] / (below[2] + 25e-3), 3.0 / 25, 1e-12);
+  EXPECT_NEAR(below[1] / (below[2] + 25e-3), -2.0 / 25, 1e-12);
+  const SurfaceTable table = make_surface_table(sphere, 301, 201, 0.05);
+  const auto seen = project_to_surface(table, below);
+  ASSERT_TRUE(seen.has_value());
+  EXPECT_NEAR(seen->column, 150 + 60, 0.02);
+  EXPECT_NEAR(seen->row, 100 - 40, 0.02);
+}
+
 TEST(CastRay, TheAxisLeavesASphereAtTheOrigin) {
   const auto found = cast_ray({Kind::sphere, 12, 0, 20, 8, 1.41}, 0, 0);
   ASSERT_TRUE(found.has_value());
@@ -90,7 +113,7 @@ TEST(ProjectToSurface, IsWhereThePointWasLiftedFrom) {
         ASSERT_TRUE(at.has_value());
         for (const double lift : {-1e-3, 0.0, 0.5e-3}) {
           Vector point = at->point;
-          for (std::size_t i = 0; i < 3; ++i) point[i] += lift * at->normal[i];
+          for (std::size_t i = 0; i < 3; ++i) point[i] += lift * at->ray[i];
           const auto projection = project_to_surface(table, point);
           ASSERT_TRUE(projection.has_value()) << column << ", " << row << ", " << lift;
           EXPECT_NEAR(projection->column, column, 0.02);

@@ -29,8 +29,9 @@ v1::Subscribe pose() {
   return request;
 }
 
-v1::Subscribe wanted(bool in_contact, std::initializer_list<v1::Subscribe> requests) {
-  UpstreamSubscription demand(in_contact);
+v1::Subscribe wanted(bool in_contact, std::initializer_list<v1::Subscribe> requests,
+                     double mm_per_px = 0.0417) {
+  UpstreamSubscription demand(in_contact, mm_per_px);
   for (const v1::Subscribe& request : requests) demand.add(of(request));
   return demand.subscription();
 }
@@ -58,6 +59,20 @@ TEST(UpstreamSubscription, ContactsAndPosesFromTheirFirstFrameOn) {
   }
   EXPECT_TRUE(wanted(false, {points(false), pose()}).contact_box());
   EXPECT_FALSE(wanted(true, {points(false), pose()}).contact_box());
+}
+
+TEST(UpstreamSubscription, RecognitionHasCoarseWholeMapsDuringContact) {
+  v1::Subscribe recognition;
+  recognition.set_recognition(true);
+  EXPECT_EQ(wanted(false, {recognition}).depth(), v1::DEPTH_NONE);
+  EXPECT_EQ(wanted(true, {recognition}).depth(), v1::DEPTH_INT16);
+  EXPECT_EQ(wanted(true, {recognition}).decimation(), 4U);
+  EXPECT_FALSE(wanted(true, {recognition, pose()}).contact_box());
+  EXPECT_EQ(wanted(true, {recognition, pose()}).decimation(), 0U);
+  // The network's cells are 0.25 mm wide.
+  EXPECT_EQ(wanted(true, {recognition}, 0).decimation(), 4U) << "nothing known yet";
+  EXPECT_EQ(wanted(true, {recognition}, 0.1).decimation(), 2U);
+  EXPECT_EQ(wanted(true, {recognition, points(false, 4)}, 0.2).decimation(), 0U);
 }
 
 TEST(UpstreamSubscription, AsCoarseAsTheFinestClient) {

@@ -1,0 +1,40 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <utility>
+
+#include "clients/perceive/recognition/touch_map.hpp"
+#include "tests/accuracy/whole/random_draw.hpp"
+
+namespace dtact::recognition {
+
+/// A press and its truth.
+struct Press {
+  int kind = 0;  ///< Index into kinds().
+  int variant = 0;
+  double thickness_mm = 0;  ///< Of the gel.
+  double depth_mm = 0;
+  double x_mm = 0;
+  double y_mm = 0;
+  double newtons = 0;
+};
+
+/// Simulated presses on one sensor that is drawn at random: gel of 1 to 3 mm, scattering, noise,
+/// response, light. The sensor is calibrated by a press of a ball, as a user does.
+struct Wanted {
+  std::uint64_t seed = 1;
+  int sensor = 0;
+  int presses = 60;
+  /// Draws what is pressed: kind and variant.
+  std::function<std::pair<int, int>(whole::Draw&)> object;
+  double grid_mm = 0.25;   ///< Of the contact.
+  int camera_width = 400;  ///< Pixels; the field stays.
+};
+
+/// Calls `take` for each press that presses by at most 80 N and whose depth map shows a contact.
+/// Returns false, without a press, for a sensor whose calibration is refused.
+bool make_presses(const Wanted& wanted,
+                  const std::function<void(const Press&, const perceive::TouchMap&)>& take);
+
+}  // namespace dtact::recognition

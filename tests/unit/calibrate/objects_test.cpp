@@ -1,0 +1,185 @@
+// dtact-calibrate objects: evaluate on drawn presses of a ball and of a plate's corner; a folder of
+// taught objects with damaged files.
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <functional>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "clients/calibrate/calibrate.hpp"
+#include "clients/common/depth_file.hpp"
+#include "clients/perceive/recognition/taught_objects.hpp"
+#include "clients/recording/recording_writer.hpp"
+#include "hal/base/atomic_file.hpp"
+#include "hal/files/mcap_file_sink.hpp"
+#include "hal/files/png.hpp"
+#include "tests/unit/calibration/sample.hpp"
+
+namespace dtact::objects {
+namespace {
+
+using testing::HasSubstr;
+
+constexpr int kWidth = 125;  // 500 x 400 at a quarter of 0.0417 mm
+constexpr int kHeight = 100;
+constexpr double kMmPerPx = 4 * 0.0417;
+
+using Shape = std::function<double(double x_mm, double y_mm)>;
+
+Shape ball(double radius_mm) {
+  return [=](double x, double y) {
+    const double r = std::hypot(x, y);
+    return r < radius_mm ? 1 - radius_mm + std::sqrt(radius_mm * radius_mm - r * r) : 0;
+  };
+}
+double corner(double x, double y) { return x > -2 && x < 3 && y > -1.5 && y < 4 ? 0.9 : 0; }
+
+/// Millimetres, with the shape's middle at (x, y) pixels.
+std::vector<float> map_of(const Shape& shape, int x, int y) {
+  std::vector<float> mm;
+  for (int row = 0; row < kHeight; ++row) {
+    for (int column = 0; column < kWidth; ++column) {
+      mm.push_back(
+          static_cast<float>(std::max(0.0, shape(kMmPerPx * (column - x), kMmPerPx * (row - y)))));
+    }
+  }
+  return mm;
+}
+
+class Evaluate : public testing::Test {
+ protected:
+  [[nodiscard]] std::string at(const std::string& name) const {
+    return (temp_.path() / name).string();
+  }
+  void write_map(const std::string& name, const std::vector<float>& mm) const {
+    std::filesystem::create_directories(std::filesystem::path(at(name)).parent_path());
+    base::write_file_atomically(
+        at(name), cli::encode_npy({kWidth, kHeight, kMmPerPx, std::span<const float>(mm)}));
+  }
+  /// Each press is 0.3 s of contact, and a frame without contact after it.
+  void write_recording(const std::string& name, const std::vector<std::vector<float>>& presses) {
+    std::filesystem::create_directories(std::filesystem::path(at(name)).parent_path());
+    mcap::FileSink sink(at(name), true);
+    recording::RecordingWriter writer(sink, {.program = "test"});
+    std::uint64_t sequence = 0;
+    for (const std::vector<float>& mm : presses) {
+      for (int i = 0; i < 19; ++i) {
+        v1::Frame frame;
+        frame.set_sequence(++sequence);
+        frame.set_wall_ns(static_cast<std::int64_t>(sequence) * 16'666'667);
+        frame.set_monotonic_ns(frame.wall_ns());
+        frame.mutable_contact()->set_in_contact(i < 18);
+        v1::DepthMap& map = *frame.mutable_depth();
+        map.set_encoding(v1::DEPTH_INT16);
+        map.set_width(kWidth);
+        map.set_height(kHeight);
+        map.set_full_width(kWidth);
+        map.set_full_height(kHeight);
+        map.set_mm_per_px(kMmPerPx);
+        map.set_um_per_unit(1);
+        for (const float value : mm) {
+          const auto um = static_cast<unsigned>(std::lround(1000 * value));
+          map.mutable_data()->push_back(static_cast<char>(um & 0xFFU));
+          map.mutable_data()->push_back(static_cast<char>(um >> 8U));
+        }
+        writer.add(frame);
+      }
+    }
+    writer.finish();
+  }
+  int run(std::vector<std::string> options = {}) {
+    options.insert(options.begin(), {"objects", "evaluate", at("presses")});
+    std::ostringstream out;
+    std::ostringstream error;
+    const int code = calibrate::run(options, out, error);
+    said_ = out.str() + error.str();
+    return code;
+  }
+
+  std::string said_;
+
+ private:
+  const calibration::TempFolder temp_;
+};
+
+TEST_F(Evaluate, SaysBothSplitsAndDrawsTheTable) {
+  write_recording("presses/ball/1.mcap",
+                  {map_of(ball(4), 50, 40), map_of(ball(4), 71, 52), map_of(ball(4), 60, 61)});
+  write_map("presses/plate/left/1.npy", map_of(corner, 55, 45));
+  write_map("presses/plate/left/2.npy", map_of(corner, 63, 47));
+  write_map("presses/plate/right/1.npy", map_of(corner, 70, 50));
+  ASSERT_EQ(run({"--mm-per-px", "0.1668", "-o", at("table.png")}), 0) << said_;
+  EXPECT_THAT(said_, HasSubstr("ball: 3 presses or objects\nplate: 2 presses or objects\n"));
+  // Three contacts of three frames, and three maps.
+  EXPECT_THAT(said_, HasSubstr("in the paper: 1.000 of 4\n"));
+  EXPECT_THAT(said_, HasSubstr("as a new press: 1.000 of 12\n"));
+  EXPECT_THAT(said_, HasSubstr("ball is named ball 100 %\nplate is named plate 100 %\n"));
+  const auto header = image::png_header(base::read_file(at("table.png")), "table.png");
+  EXPECT_GT(header.width, 200);
+  EXPECT_FALSE(header.grey);
+}
+
+// A press that looks like nothing else of its name is not known by its own frames.
+TEST_F(Evaluate, APressIsKnownByOtherPressesOnly) {
+  write_recording("presses/ball/1.mcap", {map_of(ball(4), 50, 40), map_of(corner, 71, 52)});
+  write_map("presses/plate/1.npy", map_of(corner, 55, 45));
+  write_map("presses/plate/2.npy", map_of(corner, 63, 47));
+  ASSERT_EQ(run({"--mm-per-px", "0.1668"}), 0) << said_;
+  EXPECT_THAT(said_, testing::Not(HasSubstr("as a new press: 1.000")));
+}
+
+TEST_F(Evaluate, WhatItCannotUseIsNamed) {
+  EXPECT_NE(run(), 0);
+  EXPECT_THAT(said_, HasSubstr(at("presses") + ": there is no such folder"));
+  write_map("presses/ball/1.npy", map_of(ball(4), 50, 40));
+  EXPECT_NE(run(), 0);
+  EXPECT_THAT(said_, HasSubstr(at("presses") + ": two objects are needed at least"));
+  write_map("presses/plate/1.npy", map_of(corner, 50, 40));
+  EXPECT_NE(run(), 0);
+  EXPECT_THAT(said_, HasSubstr(at("presses/ball/1.npy") + ": has no scale: give --mm-per-px"));
+  EXPECT_NE(run({"--mm-per-px", "0.1668"}), 0);
+  EXPECT_THAT(said_, HasSubstr(at("presses/ball") + ": two presses of 0.3 mm and more are needed"));
+  const std::string whole = base::read_file(at("presses/ball/1.npy"));
+  base::write_file_atomically(at("presses/ball/1.npy"), whole.substr(0, whole.size() - 4));
+  EXPECT_NE(run({"--mm-per-px", "0.1668"}), 0);
+  EXPECT_THAT(said_, HasSubstr(at("presses/ball/1.npy") + ": is no array"));
+  write_recording("presses/ball/1.mcap", {map_of(ball(4), 50, 40)});
+  base::write_file_atomically(at("presses/ball/1.npy"),
+                              cli::npy_head("(3,)") + cli::npy_values(std::vector<float>{1, 2, 3}));
+  EXPECT_NE(run({"--mm-per-px", "0.1668"}), 0);
+  EXPECT_THAT(said_, HasSubstr(at("presses/ball/1.npy") + ": is no depth map"));
+}
+
+TEST(TaughtObjects, ADamagedFileIsListedAndForgotten) {
+  const calibration::TempFolder temp;
+  perceive::write_presses(temp.path(), "lid", std::vector<perceive::TouchMap>(3));
+  base::write_file_atomically(temp.path() / "torn.png", "no picture");
+  std::filesystem::create_directories(temp.path() / "folder.png" / "of somebody");
+  const auto run = [&](std::vector<std::string> words) {
+    words.insert(words.end(), {"--taught", temp.path().string()});
+    std::ostringstream out;
+    const int code = calibrate::run(words, out, out);
+    return fmt::format("{} {}", code, out.str());
+  };
+  const std::string at = temp.path().string();
+  EXPECT_EQ(run({"objects", "list"}),
+            "0 folder: damaged: " + at + "/folder.png is not a file: forget folder, or teach it " +
+                "again\nlid: 3 presses\ntorn: damaged: " + at +
+                "/torn.png: not a readable PNG: it " +
+                "does not begin as one: forget torn, or teach it again\n");
+  EXPECT_THAT(run({"objects", "list", "--json"}), HasSubstr("forget torn, or teach it again"));
+  EXPECT_EQ(run({"objects", "forget", "torn"}), "0 ");
+  EXPECT_THAT(run({"objects", "forget", "folder"}), HasSubstr("remove it yourself"));
+  std::filesystem::remove(temp.path() / "folder.png" / "of somebody");
+  EXPECT_EQ(run({"objects", "forget", "folder"}), "0 ");
+  EXPECT_EQ(run({"objects", "list"}), "0 lid: 3 presses\n");
+}
+
+}  // namespace
+}  // namespace dtact::objects
