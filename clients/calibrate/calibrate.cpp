@@ -2,6 +2,7 @@
 
 #include "clients/calibrate/force/force_command.hpp"
 #include "clients/calibrate/guided_command.hpp"
+#include "clients/calibrate/objects/objects_command.hpp"
 #include "clients/calibrate/offline/offline.hpp"
 #include "clients/calibrate/reprocess/reprocess.hpp"
 
@@ -17,6 +18,7 @@ void set_up(CLI::App& app, cli::Context& context) {
   cli::add_json_option(*app.get_subcommand("evaluate"), context);
   force::add_force(app, context);
   reprocess::add_reprocess(app, context);
+  objects::add_objects(app, context);
 }
 
 int run(const std::vector<std::string>& arguments, std::ostream& out, std::ostream& error) {

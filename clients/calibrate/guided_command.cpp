@@ -1,10 +1,9 @@
 #include "clients/calibrate/guided_command.hpp"
 
 #include <fmt/format.h>
-#include <unistd.h>
 
-#include <iostream>
 #include <memory>
+#include <utility>
 
 #include "clients/calibrate/guided/console.hpp"
 #include "clients/calibrate/guided/session.hpp"
@@ -16,20 +15,11 @@ namespace dtact::ctl {
 namespace {
 
 void run_guided(const cli::Context& context, guided::Plan plan) {
-  const bool terminal =
-      &context.out == &std::cout && ::isatty(STDOUT_FILENO) == 1 && ::isatty(STDIN_FILENO) == 1;
   const cli::Interruptible while_guiding;
   guided::LiveSensor sensor(context.target);
-  const std::unique_ptr<guided::Console> console = [&]() -> std::unique_ptr<guided::Console> {
-    if (context.json) {
-      return std::make_unique<guided::JsonConsole>(STDIN_FILENO, context.out,
-                                                   cli::Interruptible::happened);
-    }
-    return std::make_unique<guided::StreamConsole>(STDIN_FILENO, context.out, terminal,
-                                                   cli::Interruptible::happened);
-  }();
+  const auto console = guided::make_console(context);
   try {
-    if (guided::Session(sensor, *console, plan).run() == guided::Outcome::unfinished) {
+    if (guided::Session(sensor, *console, std::move(plan)).run() == guided::Outcome::unfinished) {
       throw cli::Failure(cli::kNotMet, "there is no calibration yet");
     }
   } catch (const guided::CaptureTimeout& e) {

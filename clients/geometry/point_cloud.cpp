@@ -95,7 +95,7 @@ void CloudMaker::prepare(const DepthGrid& depth) {
     return;
   }
   if (tables_.size() == kMaxTables) tables_.pop_back();
-  SurfaceTable table{depth.full_width, depth.full_height, depth.mm_per_px, {}, {}};
+  SurfaceTable table{depth.full_width, depth.full_height, depth.mm_per_px, {}, {}, {}};
   if (!flat()) {
     table = make_surface_table(surface_, depth.full_width, depth.full_height, depth.mm_per_px);
   }
@@ -109,9 +109,13 @@ Vector CloudMaker::point(const Work& work, int row, int column) const {
             work.part(PointCloud::kZ, row)[column]};
   }
   const int value = work.values(row)[column];
-  return {(depth.x + column - 0.5 * (depth.full_width - 1)) * depth.mm_per_px * kMetre,
-          (depth.y + row - 0.5 * (depth.full_height - 1)) * depth.mm_per_px * kMetre,
-          value == depth.untrusted ? kNaN : -double{static_cast<float>(value) * work.unit.metres}};
+  const double down =
+      value == depth.untrusted ? kNaN : double{static_cast<float>(value) * work.unit.metres};
+  const recon::Point place =
+      surface_.view.place({(depth.x + column - 0.5 * (depth.full_width - 1)) * depth.mm_per_px,
+                           (depth.y + row - 0.5 * (depth.full_height - 1)) * depth.mm_per_px},
+                          down / kMetre);
+  return {place.x * kMetre, place.y * kMetre, -down};
 }
 
 /// One point and its normal where one of the four neighbours at `reach` is missing.
@@ -161,22 +165,6 @@ void CloudMaker::erase_lone(const Work& work) const {
   }
 }
 
-/// x and y of a plane, where they are not there yet.
-void CloudMaker::place(const Work& work, int row) const {
-  const DepthGrid& depth = work.depth;
-  std::uint64_t& placed = work.drawn(row).placed;
-  const double px = depth.mm_per_px * kMetre;
-  const auto y = static_cast<float>((depth.y + row - 0.5 * (depth.full_height - 1)) * px);
-  const auto origin = static_cast<float>((depth.x - 0.5 * (depth.full_width - 1)) * px);
-  const auto step = static_cast<float>(px);
-  work.for_each_run(~placed, [&](int begin, int end) {
-    float* x = work.part(PointCloud::kX, row);
-    for (int i = begin; i < end; ++i) x[i] = origin + step * static_cast<float>(i);
-    std::fill_n(work.part(PointCloud::kY, row) + begin, end - begin, y);
-  });
-  placed = ~std::uint64_t{0};
-}
-
 /// The points of a curved surface, where they are not the undeformed surface's now and before.
 void CloudMaker::press_row(const Work& work, int row) const {
   const DepthGrid& depth = work.depth;
@@ -189,7 +177,7 @@ void CloudMaker::press_row(const Work& work, int row) const {
   work.for_each_run(pressed | ~placed, [&](int begin, int end) {
     const std::size_t at = from + static_cast<std::size_t>(begin);
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      press(table.point[axis].data() + at, table.normal[axis].data() + at, work.values(row) + begin,
+      press(table.point[axis].data() + at, table.ray[axis].data() + at, work.values(row) + begin,
             work.unit, end - begin, work.part(static_cast<PointCloud::Part>(axis), row) + begin);
     }
   });
@@ -210,8 +198,17 @@ void CloudMaker::make_part(const Work& work, int row, int begin, int end) {
   float* ny = work.part(PointCloud::kNormalY, row);
   float* nz = work.part(PointCloud::kNormalZ, row);
   if (flat()) {
-    flat_points(work.values(row), work.unit, static_cast<float>(depth.mm_per_px * kMetre), part,
-                work.part(PointCloud::kZ, row), nx, ny, nz);
+    const auto metres = [](double mm) { return static_cast<float>(mm * kMetre); };
+    const recon::Viewpoint& view = surface_.view;
+    const FlatRow at{.x = metres((depth.x - 0.5 * (depth.full_width - 1)) * depth.mm_per_px),
+                     .y = metres((depth.y + row - 0.5 * (depth.full_height - 1)) * depth.mm_per_px),
+                     .step = metres(depth.mm_per_px),
+                     .foot_x = metres(view.foot_mm.x),
+                     .foot_y = metres(view.foot_mm.y),
+                     .per_metre = static_cast<float>(view.per_mm / kMetre)};
+    flat_points(work.values(row), work.unit, at, part,
+                {work.part(PointCloud::kX, row), work.part(PointCloud::kY, row),
+                 work.part(PointCloud::kZ, row), nx, ny, nz});
   } else {
     curved_normals(work.part(PointCloud::kX, row), work.out.size(), part, nx, ny, nz);
   }
@@ -268,7 +265,7 @@ void CloudMaker::make_whole(const DepthGrid& depth, PointCloud& out) {
       pressed_[static_cast<std::size_t>(placed)] =
           work.rests ? pressed_tiles(work.values(placed), depth.width, work.tile)
                      : ~std::uint64_t{0};
-      flat() ? place(work, placed) : press_row(work, placed);
+      if (!flat()) press_row(work, placed);
     }
     make_row(work, row);
   }

@@ -44,7 +44,7 @@ struct PointCloud {
     /// Bits of a row's tiles: which hold the undeformed surface's …
     struct Row {
       std::uint64_t rest = 0;    ///< … points and normals, …
-      std::uint64_t placed = 0;  ///< … points; of a plane their x and y.
+      std::uint64_t placed = 0;  ///< … points, of a curved surface.
     };
     std::vector<Row> rows;
   } drawn;
@@ -100,7 +100,6 @@ class CloudMaker {
   void make_whole(const DepthGrid& depth, PointCloud& out);
   [[nodiscard]] std::uint64_t resting(const Work& work, int row) const;
   void make_row(const Work& work, int row);
-  void place(const Work& work, int row) const;
   void press_row(const Work& work, int row) const;
   void make_part(const Work& work, int row, int begin, int end);
   void fix(const Work& work, int row, int column);

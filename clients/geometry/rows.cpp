@@ -74,32 +74,45 @@ void quantise(const float* __restrict values, std::size_t count, float per_unit,
   }
 }
 
-void press(const float* __restrict point, const float* __restrict normal,
+void press(const float* __restrict point, const float* __restrict ray,
            const std::int16_t* __restrict depth, DepthUnit unit, int count,
            float* __restrict out) noexcept {
   for (int i = 0; i < count; ++i) {
-    out[i] = point[i] - trusted(depth[i], unit) * unit.metres * normal[i];
+    out[i] = point[i] - trusted(depth[i], unit) * unit.metres * ray[i];
   }
 }
 
-void flat_points(const std::int16_t* __restrict depth, DepthUnit unit, float px_metres,
-                 const RowPart& part, float* __restrict z, float* __restrict nx,
-                 float* __restrict ny, float* __restrict nz) noexcept {
+void flat_points(const std::int16_t* __restrict depth, DepthUnit unit, const FlatRow& row,
+                 const RowPart& part, const RowPoints& out) noexcept {
+  float* __restrict x = out.x;
+  float* __restrict y = out.y;
+  float* __restrict z = out.z;
+  float* __restrict nx = out.nx;
+  float* __restrict ny = out.ny;
+  float* __restrict nz = out.nz;
   const std::ptrdiff_t rows = (part.below - part.above) / part.width;
-  const float per_row = unit.metres / (static_cast<float>(rows) * px_metres);
+  const float per_row = unit.metres / (static_cast<float>(rows) * row.step);
+  const FlatRow at = row;
+  const float lean_y = at.per_metre * (at.y - at.foot_y);
   with_neighbours(part, [=](int begin, int end, int left, int right) {
-    const float per_column = unit.metres / (static_cast<float>(right - left) * px_metres);
+    const float per_column = unit.metres / (static_cast<float>(right - left) * at.step);
     for (int i = begin; i < end; ++i) {
-      const std::int16_t* at = depth + i;
-      const float here = trusted(*at, unit);
-      const float gx = (trusted(at[right], unit) - trusted(at[left], unit)) * per_column;
-      const float gy = (trusted(at[part.below], unit) - trusted(at[part.above], unit)) * per_row;
+      const std::int16_t* here = depth + i;
+      const float down = trusted(*here, unit) * unit.metres;
+      const float gx = (trusted(here[right], unit) - trusted(here[left], unit)) * per_column;
+      const float gy =
+          (trusted(here[part.below], unit) - trusted(here[part.above], unit)) * per_row;
+      const float seen = at.x + at.step * static_cast<float>(i);
+      const float lean_x = at.per_metre * (seen - at.foot_x);
       // NaN where there is no depth here.
-      const float scale = 1 / std::sqrt(1 + gx * gx + gy * gy) + 0 * here;
-      z[i] = -(here * unit.metres);
+      const float up = 1 - at.per_metre * down - lean_x * gx - lean_y * gy;
+      const float scale = 1 / std::sqrt(up * up + gx * gx + gy * gy) + 0 * down;
+      x[i] = seen - lean_x * down;
+      y[i] = at.y - lean_y * down;
+      z[i] = -down;
       nx[i] = gx * scale;
       ny[i] = gy * scale;
-      nz[i] = scale;
+      nz[i] = up * scale;
     }
   });
 }

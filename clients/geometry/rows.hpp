@@ -28,8 +28,8 @@ struct DepthUnit {
 /// The nearest whole number to value · per_unit, within ±32767; −32768 for NaN.
 void quantise(const float* values, std::size_t count, float per_unit, std::int16_t* out) noexcept;
 
-/// point − depth · normal of one axis; NaN where untrusted.
-void press(const float* point, const float* normal, const std::int16_t* depth, DepthUnit unit,
+/// point − depth · ray of one axis; NaN where untrusted.
+void press(const float* point, const float* ray, const std::int16_t* depth, DepthUnit unit,
            int count, float* out) noexcept;
 
 /// A row and the range of its pixels to compute. Neighbours are `reach` pixels away along the row,
@@ -46,10 +46,31 @@ struct RowPart {
 // Outward unit normals by the differences of the neighbours. NaN where the pixel or a neighbour is
 // none, and where there is no neighbour to either side.
 
-/// Computes a flat surface: z = −depth, and the normal (d depth/dx, d depth/dy, 1), normalised. All
-/// pointers are to the start of the row.
-void flat_points(const std::int16_t* depth, DepthUnit unit, float px_metres, const RowPart& part,
-                 float* z, float* nx, float* ny, float* nz) noexcept;
+/// A row of a plane's map: where its first pixel appears, from one to the next, and where the
+/// camera stands (recon::Viewpoint). Metres.
+struct FlatRow {
+  float x = 0;
+  float y = 0;
+  float step = 0;
+  float foot_x = 0;
+  float foot_y = 0;
+  float per_metre = 0;
+};
+/// Pointers to the start of a row.
+struct RowPoints {
+  float* x = nullptr;
+  float* y = nullptr;
+  float* z = nullptr;
+  float* nx = nullptr;
+  float* ny = nullptr;
+  float* nz = nullptr;
+};
+
+/// Computes a flat surface: the true place, z = −depth, and the normal: with the slopes g of the
+/// depth in places as they appear, (g_x, g_y, 1 − depth / height − (x − foot) · g / height),
+/// normalised. `depth` is the start of the row.
+void flat_points(const std::int16_t* depth, DepthUnit unit, const FlatRow& row, const RowPart& part,
+                 const RowPoints& out) noexcept;
 
 /// Computes normals of arbitrary points; y follows x by `apart` values, and z follows y. Also NaN
 /// where the neighbours' differences are parallel.

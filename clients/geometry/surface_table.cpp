@@ -79,16 +79,23 @@ std::optional<SurfacePoint> leave_round(const recon::Surface& surface, const Vec
   if (t <= 0) return std::nullopt;
   const Vector at = along(entry, t, direction);
   const Vector out = along(p, t, d);
-  return SurfacePoint{
-      {at[0] * kMetre, at[1] * kMetre, at[2] * kMetre},
-      {out[0] / surface.radius_mm, out[1] / surface.radius_mm, out[2] / surface.radius_mm}};
+  const Vector normal{out[0] / surface.radius_mm, out[1] / surface.radius_mm,
+                      out[2] / surface.radius_mm};
+  const double upright = dot(direction, normal);
+  return SurfacePoint{{at[0] * kMetre, at[1] * kMetre, at[2] * kMetre},
+                      normal,
+                      {direction[0] / upright, direction[1] / upright, direction[2] / upright}};
 }
 
 }  // namespace
 
 std::optional<SurfacePoint> cast_ray(const recon::Surface& surface, double x_mm, double y_mm) {
   if (surface.kind == Kind::plane) {
-    return SurfacePoint{{x_mm * kMetre, y_mm * kMetre, 0}, {0, 0, 1}};
+    const recon::Viewpoint& view = surface.view;
+    return SurfacePoint{
+        {x_mm * kMetre, y_mm * kMetre, 0},
+        {0, 0, 1},
+        {(x_mm - view.foot_mm.x) * view.per_mm, (y_mm - view.foot_mm.y) * view.per_mm, 1}};
   }
   const double radius = std::hypot(x_mm, y_mm);
   const double inwards = radius > 0 ? entry_radius(surface, radius) / radius : 0;
@@ -99,9 +106,9 @@ std::optional<SurfacePoint> cast_ray(const recon::Surface& surface, double x_mm,
 
 SurfaceTable make_surface_table(const recon::Surface& surface, int width, int height,
                                 double mm_per_px) {
-  SurfaceTable table{width, height, mm_per_px, {}, {}};
+  SurfaceTable table{width, height, mm_per_px, {}, {}, {}};
   const auto size = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
-  for (auto* part : {&table.point, &table.normal}) {
+  for (auto* part : {&table.point, &table.normal, &table.ray}) {
     for (auto& values : *part) values.assign(size, std::numeric_limits<float>::quiet_NaN());
   }
   std::size_t pixel = 0;
@@ -113,6 +120,7 @@ SurfaceTable make_surface_table(const recon::Surface& surface, int width, int he
       for (std::size_t i = 0; i < 3; ++i) {
         table.point[i][pixel] = static_cast<float>(found->point[i]);
         table.normal[i][pixel] = static_cast<float>(found->normal[i]);
+        table.ray[i][pixel] = static_cast<float>(found->ray[i]);
       }
     }
   }
@@ -138,9 +146,10 @@ std::optional<SurfaceProjection> project_to_surface(const SurfaceTable& table,
     const double r = std::clamp(row, 0.0, last_row);
     const Between at = between(table, table.point, c, r);
     const Vector normal = between(table, table.normal, c, r).value;
-    // What lies along the surface: the table's steps are chords, which lean.
+    const Vector ray = between(table, table.ray, c, r).value;
+    // What lies beside the ray, along the surface: the table's steps are chords, which lean.
     Vector off = along(point, -1, at.value);
-    off = along(off, -dot(off, normal) / dot(normal, normal), normal);
+    off = along(off, -dot(off, normal) / dot(ray, normal), ray);
     const double cc = dot(at.along_row, at.along_row);
     const double cr = dot(at.along_row, at.along_column);
     const double rr = dot(at.along_column, at.along_column);

@@ -13,6 +13,9 @@ namespace dtact::perceive {
 struct SurfacePoint {
   Vector point = {};  ///< Metres.
   Vector normal = {};
+  /// Direction of the camera ray there, as long as 1 along the normal: the point that is seen there
+  /// and pressed in by d is at point − d · ray.
+  Vector ray = {};
 };
 
 /// Where the camera ray leaves the gel that crosses the plane z = 0 at (x, y), in millimetres: what
@@ -29,11 +32,12 @@ struct SurfaceTable {
   double mm_per_px = 0;
   std::array<std::vector<float>, 3> point;  ///< x, y, z; metres.
   std::array<std::vector<float>, 3> normal;
+  std::array<std::vector<float>, 3> ray;
 };
 [[nodiscard]] SurfaceTable make_surface_table(const recon::Surface& surface, int width, int height,
                                               double mm_per_px);
 
-/// The place of a depth map whose normal goes through a point, above or below the surface.
+/// The place of a depth map whose ray goes through a point, above or below the surface.
 struct SurfaceProjection {
   double column = 0;  ///< In the whole map; fractional.
   double row = 0;

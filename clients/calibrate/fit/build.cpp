@@ -163,7 +163,8 @@ image::Grey8 rectified_mean(const recon::RectifyTable& table,
 }
 
 Calibration empty_calibration(const image::Grey16& reference_q8, const std::optional<Crop>& crop,
-                              double mm_per_px, const std::optional<recon::Lens>& lens) {
+                              double mm_per_px, const std::optional<recon::Lens>& lens,
+                              const CameraView& view) {
   const int width = reference_q8.width;
   const int height = reference_q8.height;
   const Crop part = crop.value_or(seen(lens, width, height, mm_per_px));
@@ -179,8 +180,56 @@ Calibration empty_calibration(const image::Grey16& reference_q8, const std::opti
   calibration.crop_col = part.col;
   calibration.crop_row = part.row;
   calibration.lens = lens;
+  calibration.view = view;
+  if (view.source != HeightSource::unknown && view.per_mm == 0) {
+    calibration.view = {view.foot_mm, HeightSource::assumed, kAssumedPerMm};
+  }
+  if (lens) {
+    const recon::Point centre =
+        surface_point(*lens, {part.col, part.row, part.width, part.height, mm_per_px},
+                      0.5 * (part.width - 1), 0.5 * (part.height - 1));
+    calibration.view.foot_mm = {view.foot_mm.x - centre.x, view.foot_mm.y - centre.y};
+  }
+  model->surface.view = {calibration.view.foot_mm, calibration.view.per_mm};
+  if (view.source == HeightSource::unknown) {
+    calibration.view = {};
+    model->surface.view = {};
+  }
   calibration.model = std::move(model);
   return calibration;
+}
+
+CameraView view_with(const CameraView& view, const recon::DepthLut& lut) {
+  if (view.source == HeightSource::unknown || view.per_mm != 0) return view;
+  const double mm_per_level = slope_mm(lut);
+  const double per_mm = view.per_level / mm_per_level;
+  if (!(per_mm >= kMinPerMm && per_mm <= kMaxPerMm)) {
+    return {view.foot_mm, HeightSource::assumed, kAssumedPerMm};
+  }
+  return {view.foot_mm, view.source, per_mm, 0, view.error / mm_per_level};
+}
+
+std::string describe(const CameraView& view) {
+  if (view.source == HeightSource::unknown) return {};
+  const auto from = [&] {
+    switch (view.source) {
+      case HeightSource::board:
+        return "as the board of pins shows";
+      case HeightSource::drawing:
+        return "as the drawing says";
+      case HeightSource::presses:
+        return "as the presses show";
+      default:
+        return "assumed: neither a board nor presses show it";
+    }
+  };
+  return fmt::format(
+      "camera: {:.1f}{} mm above the surface ({}), its axis meets it {:.2f} mm right of and {:.2f} "
+      "mm "
+      "below the map's middle",
+      1 / view.per_mm,
+      view.error > 0 ? fmt::format(" ± {:.1f}", view.error / (view.per_mm * view.per_mm)) : "",
+      from(), view.foot_mm.x, view.foot_mm.y);
 }
 
 bool reaches_corners(const recon::FlatFieldGain& gain, double width_mm, double height_mm) noexcept {
@@ -215,6 +264,37 @@ std::string gain_left_out(const recon::FlatFieldGain& gain, const Calibration& c
          "it would halve or double darkening; give the --crop that the board covered to use it";
 }
 
+DarkeningMap in_true_places(const DarkeningMap& map, const recon::Viewpoint& view,
+                            const std::function<double(double level)>& depth_mm) {
+  const double middle_x = 0.5 * (map.width - 1);
+  const double middle_y = 0.5 * (map.height - 1);
+  // NaN beyond the map, too.
+  const auto level_at = [&](recon::Point mm) -> double {
+    const double x = mm.x / map.mm_per_px + middle_x;
+    const double y = mm.y / map.mm_per_px + middle_y;
+    if (!(x >= 0 && y >= 0 && x <= map.width - 1 && y <= map.height - 1)) return NAN;
+    const int left = std::min(static_cast<int>(x), map.width - 2);
+    const int top = std::min(static_cast<int>(y), map.height - 2);
+    return std::lerp(std::lerp(map.at(left, top), map.at(left + 1, top), x - left),
+                     std::lerp(map.at(left, top + 1), map.at(left + 1, top + 1), x - left),
+                     y - top);
+  };
+  constexpr int kRounds = 4;  // each a tenth of the distance before, or less
+  DarkeningMap out = map;
+  std::size_t i = 0;
+  for (int y = 0; y < map.height; ++y) {
+    for (int x = 0; x < map.width; ++x, ++i) {
+      const recon::Point place{(x - middle_x) * map.mm_per_px, (y - middle_y) * map.mm_per_px};
+      double level = map.levels[i];
+      for (int round = 0; round < kRounds && !std::isnan(level); ++round) {
+        level = level_at(view.seen(place, depth_mm(level)));
+      }
+      out.levels[i] = static_cast<float>(level);
+    }
+  }
+  return out;
+}
+
 SettledPress settle(const recon::Model& model, std::span<const std::uint16_t> reference_q8,
                     std::span<const image::Grey8> frames, double ball_radius_mm) {
   SettledPress press;
@@ -230,6 +310,20 @@ SettledPress settle(const recon::Model& model, std::span<const std::uint16_t> re
     press.map = smoothed_darkening(model, press.reference_q8, frames);
     press.contact = find_contact(press.map, ball_radius_mm);
   }
+  const recon::Viewpoint& view = model.surface.view;
+  if (view.per_mm == 0) return press;
+  const DarkeningMap seen = std::move(press.map);
+  // Depth along a straight line: first that to the depth of the contact's radius, then the press's
+  // own.
+  const auto place_by = [&](double slope) {
+    press.map = in_true_places(seen, view, [slope](double level) {
+      constexpr double kBulged = 1.0 / 3;  // a bulge brightens three times as steeply
+      return slope * (level < 0 ? kBulged : 1) * level;
+    });
+    press.contact = find_contact(press.map, ball_radius_mm);
+  };
+  place_by(sag_mm(ball_radius_mm, press.contact.radius_mm) / press.contact.peak_levels);
+  place_by(fit_sag(press.map, press.contact).slope);
   return press;
 }
 
@@ -259,7 +353,7 @@ std::string PressChoices::describe() const {
 Calibration build(const BallPress& press, PressChoices* choices) {
   check(press);
   Calibration calibration =
-      empty_calibration(press.reference_q8, press.crop, press.mm_per_px, press.lens);
+      empty_calibration(press.reference_q8, press.crop, press.mm_per_px, press.lens, press.view);
   auto model = std::make_shared<recon::Model>(*calibration.model);
   model->method = press.method;
   if (press.method == recon::Method::lut) model->gain = gain_on_map(press.gain, calibration);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <span>
 #include <string>
@@ -21,8 +22,14 @@ struct SettledPress {
   std::vector<std::uint16_t> reference_q8;  ///< The reference moved by the drift.
 };
 
-/// Finds the contact. Where the far field shows that the light drifted between reference and
-/// frames, moves the reference by the drift and finds it again. Throws like find_contact().
+/// The map at the places where its points lie, instead of where they appear: `depth_mm(level)` is
+/// how deep a point of that darkening is pressed in. Interpolated between the pixels.
+[[nodiscard]] DarkeningMap in_true_places(const DarkeningMap& map, const recon::Viewpoint& view,
+                                          const std::function<double(double level)>& depth_mm);
+
+/// Finds the contact, in a map of true places where the model knows the camera's place. Where the
+/// far field shows that the light drifted between reference and frames, moves the reference by the
+/// drift and finds it again. Throws like find_contact().
 [[nodiscard]] SettledPress settle(const recon::Model& model,
                                   std::span<const std::uint16_t> reference_q8,
                                   std::span<const image::Grey8> frames, double ball_radius_mm);
@@ -48,6 +55,7 @@ struct BallPress {
   std::optional<recon::Lens> lens;  ///< None: the frame is not rectified.
   /// Part of the frame or, with a lens, of the rectified image; none: the whole frame.
   std::optional<Crop> crop;
+  CameraView view;  ///< Of the lens; unknown: depth is placed as it is seen.
   /// Places in millimetres of the lens's surface; without a lens from the map's centre. The
   /// published method has none.
   recon::FlatFieldGain gain = {};
@@ -82,10 +90,18 @@ struct PressChoices {
 void check_sizes(double ball_radius_mm, double mm_per_px);
 
 /// A calibration without a LUT: frame, crop (none: the whole frame), scale, lens,
-/// smoothing, reference. Throws std::invalid_argument when the crop leaves the frame.
+/// smoothing, reference, camera's place. A height that is known in grey levels only is assumed
+/// until a LUT says it (view_with()). Throws std::invalid_argument when the crop leaves the frame.
 [[nodiscard]] Calibration empty_calibration(const image::Grey16& reference_q8,
                                             const std::optional<Crop>& crop, double mm_per_px,
-                                            const std::optional<recon::Lens>& lens);
+                                            const std::optional<recon::Lens>& lens,
+                                            const CameraView& view = {});
+
+/// The view with the height that a LUT makes of its grey levels: the board's where it is believed
+/// (kMinPerMm to kMaxPerMm), else the assumed one. One that has a height stays.
+[[nodiscard]] CameraView view_with(const CameraView& view, const recon::DepthLut& lut);
+/// "camera: 31 ± 1 mm above the surface (board of pins), its axis meets it ...".
+[[nodiscard]] std::string describe(const CameraView& view);
 
 /// Whether a gain, of positions from the middle of a map of this size, stays between half and twice
 /// of its middle at the map's corners. It is fitted where presses or pins are and used everywhere:

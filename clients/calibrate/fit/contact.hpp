@@ -47,8 +47,11 @@ class NoContact : public std::runtime_error {
 
 /// Finds a ball's contact. The centre is the centroid of the darkening over the connected patch
 /// darker than 0.3 of the peak, weighted with the darkening; the radius is where the mean darkening
-/// about it falls to 3 grey levels, at most 0.85 of the ball's radius (further out the sphere is so
-/// steep that a pixel spans 0.1 mm of depth). Throws with the fix: NoContact without
+/// about it falls to 3 grey levels, at most 0.85 of the ball's radius. Further out the sphere is so
+/// steep that a pixel spans 0.1 mm of depth, and a contact that wide is a wrong scale or radius
+/// more often than a press of half the ball, which few gels are thick enough for: where the sphere
+/// ends there, LUT and sphere disagree and doubts_about() finds it (0.29 mm with sensor_a's scale 8
+/// % too large; 0.13, unnoticed, with the whole contact). Throws with the fix: NoContact without
 /// contact (below 8 grey levels), std::runtime_error when the contact leaves the map.
 [[nodiscard]] Contact find_contact(const DarkeningMap& map, double ball_radius_mm);
 

@@ -140,13 +140,15 @@ Evaluation read(const recon::Model& model, const SettledPress& press,
   result.drift_levels = press.drift_levels;
   result.dim = dim_share(model, press);
 
-  const std::vector<float> depth = mean_depth_um(model, press.reference_q8, frames);
+  DarkeningMap depth{press.map.width, press.map.height, press.map.mm_per_px,
+                     mean_depth_um(model, press.reference_q8, frames)};
+  if (model.surface.view.per_mm > 0) {
+    depth = in_true_places(depth, model.surface.view, [](double um) { return 0.001 * um; });
+  }
   std::vector<double> errors;
   for_contact(press.map, press.contact, [&](int x, int y, double sphere) {
     ++result.pixels;
-    const double um =
-        depth[static_cast<std::size_t>(y) * static_cast<std::size_t>(press.map.width) +
-              static_cast<std::size_t>(x)];
+    const double um = depth.at(x, y);
     result.unseen += static_cast<std::size_t>(std::isnan(press.map.at(x, y)));
     if (std::isnan(um)) {
       ++result.untrusted;
@@ -162,13 +164,6 @@ Evaluation read(const recon::Model& model, const SettledPress& press,
   result.median_mm = spread.median;
   result.within_mm = spread.within;
   return result;
-}
-
-constexpr int kLevels = 20;  // range of the slope: a light press, about 0.6 mm
-
-double depth_um(const recon::DepthLut& lut, int q6) {
-  const int last = static_cast<int>(lut.um.size()) - 1;
-  return lut.um[static_cast<std::size_t>(std::clamp(q6 - lut.first_q6, 0, last))];
 }
 
 /// A press's contact and the mean light there; nothing without contact.
@@ -254,9 +249,7 @@ std::string dim_part_of(const Calibration& made, const BallPresses& set) {
 }
 
 std::vector<std::string> doubts_about(const recon::DepthLut& lut) {
-  const int at_q6 =
-      std::clamp(lut.covered_to_q6, recon::kEntriesPerLevel, kLevels * recon::kEntriesPerLevel);
-  const double slope = depth_um(lut, at_q6) * recon::kEntriesPerLevel / at_q6;
+  const double slope = 1000 * slope_mm(lut);
   if (slope >= kMinSlopeUm && slope <= kMaxSlopeUm) return {};
   return {fmt::format(
       "a grey level is {:.1f} um of depth; sensors of this family have 20 to 80: check the scale "

@@ -172,6 +172,13 @@ double lut_mm(const recon::DepthLut& lut, double level) {
   return 0.001 * lut.um[static_cast<std::size_t>(std::clamp(entry, 0L, last))];
 }
 
+double slope_mm(const recon::DepthLut& lut) {
+  constexpr double kLevels = 20;
+  const double covered = static_cast<double>(lut.covered_to_q6) / recon::kEntriesPerLevel;
+  const double level = std::clamp(covered, 1.0, kLevels);
+  return lut_mm(lut, level) / level;
+}
+
 SagFit fit_sag(const DarkeningMap& map, const Contact& contact, const PixelFilter& use) {
   return fit_line(sag_by_level(map, contact, use, kSureOfContact * contact.radius_mm, 1));
 }

@@ -33,6 +33,10 @@ struct Knot {
 /// The LUT's indentation for a darkening in grey levels, millimetres; its ends' beyond them.
 [[nodiscard]] double lut_mm(const recon::DepthLut& lut, double level);
 
+/// Millimetres a grey level from no darkening to 20 levels, a light press of about 0.6 mm, or to
+/// the end of what the LUT covers.
+[[nodiscard]] double slope_mm(const recon::DepthLut& lut);
+
 /// Range of a LUT: −40 to +110 grey levels.
 inline constexpr int kLutFirstLevel = -40;
 inline constexpr int kLutLastLevel = 110;

@@ -246,7 +246,8 @@ void refuse_gaps(const ChainFit& chain, const BallPresses& set,
 Calibration build(const BallPresses& presses, PressReport* report) {
   check_sizes(presses.ball_radius_mm, presses.mm_per_px);
   BallPresses set = presses;
-  Calibration calibration = empty_calibration(set.reference_q8, set.crop, set.mm_per_px, set.lens);
+  Calibration calibration =
+      empty_calibration(set.reference_q8, set.crop, set.mm_per_px, set.lens, set.view);
   const recon::Model plain = *calibration.model;
   recon::Model uniform = plain;
   uniform.gain.shape = recon::GainShape::uniform;

@@ -21,6 +21,7 @@ struct BallPresses {
   double mm_per_px = 0;
   std::optional<Crop> crop;         ///< None: the whole frame.
   std::optional<recon::Lens> lens;  ///< None: the frame is not rectified.
+  CameraView view;                  ///< As in BallPress.
   /// Whether the gain with it comes from a board: if it is none then, darkening is not a share of
   /// the light either.
   bool gain_specified = false;

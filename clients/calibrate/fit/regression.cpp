@@ -97,7 +97,8 @@ std::vector<SettledPress> settle_all(const recon::Model& model, const BallPresse
 Calibration build_regression(const BallPresses& set, double centre_x_mm, double centre_y_mm) {
   if (set.presses.empty()) throw std::invalid_argument("no press");
   check_sizes(set.ball_radius_mm, set.mm_per_px);
-  Calibration calibration = empty_calibration(set.reference_q8, set.crop, set.mm_per_px, set.lens);
+  Calibration calibration =
+      empty_calibration(set.reference_q8, set.crop, set.mm_per_px, set.lens, set.view);
   auto model = std::make_shared<recon::Model>(*calibration.model);
   const Crop crop{calibration.crop_col, calibration.crop_row, model->rectify.width,
                   model->rectify.height};

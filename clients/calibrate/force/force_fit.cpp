@@ -103,7 +103,9 @@ class Readings {
 double fitted_thickness(const std::vector<Pair>& pairs) {
   double best = 0;
   double least = std::numeric_limits<double>::infinity();
-  for (double thickness = 0.5; thickness < 5; thickness *= 1.07) {
+  constexpr int kSteps = 35;  // from 0.5 to 5 mm
+  for (int step = 0; step < kSteps; ++step) {
+    const double thickness = 0.5 * std::pow(1.07, step);
     const Readings readings(pairs, thickness);
     const double off = std::log(thickness / kThicknessMm) / kThicknessSpread;
     const double cost = readings.cost(readings.fit()) + off * off;

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <iostream>
 #include <ostream>
 #include <sstream>
 #include <string_view>
@@ -14,6 +15,7 @@
 
 #include "clients/calibrate/guided/preview.hpp"
 #include "clients/common/guided.pb.h"
+#include "clients/common/interruptible.hpp"
 #include "clients/common/json.hpp"
 
 namespace dtact::ctl::guided {
@@ -167,6 +169,16 @@ void JsonConsole::live(const Scene& scene) {
   reported.set_covered_mm(scene.covered_mm);
   reported.set_presses_required(static_cast<std::uint32_t>(scene.presses_required));
   out_ << cli::json_line(line) << std::flush;
+}
+
+std::unique_ptr<Console> make_console(const cli::Context& context) {
+  if (context.json) {
+    return std::make_unique<JsonConsole>(STDIN_FILENO, context.out, cli::Interruptible::happened);
+  }
+  const bool terminal =
+      &context.out == &std::cout && ::isatty(STDOUT_FILENO) == 1 && ::isatty(STDIN_FILENO) == 1;
+  return std::make_unique<StreamConsole>(STDIN_FILENO, context.out, terminal,
+                                         cli::Interruptible::happened);
 }
 
 }  // namespace dtact::ctl::guided

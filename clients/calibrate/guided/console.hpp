@@ -3,9 +3,11 @@
 #include <cstddef>
 #include <functional>
 #include <iosfwd>
+#include <memory>
 #include <string>
 #include <vector>
 
+#include "clients/common/program.hpp"
 #include "hal/files/png.hpp"
 
 namespace dtact::ctl::guided {
@@ -141,5 +143,8 @@ class JsonConsole : public Console {
   std::ostream& out_;
   std::function<bool()> interrupted_;
 };
+
+/// The console that the command line asks for, while a cli::Interruptible lives.
+[[nodiscard]] std::unique_ptr<Console> make_console(const cli::Context& context);
 
 }  // namespace dtact::ctl::guided

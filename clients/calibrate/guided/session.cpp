@@ -93,6 +93,7 @@ void Session::prepare_map(const v1::Status& status) {
   const auto width = static_cast<int>(status.camera().width());
   const auto height = static_cast<int>(status.camera().height());
   const MapChoice map = choose_map(plan_.map, width, height);
+  console_.say(fmt::format("scale: {:.5f} mm per pixel, from {}", map.mm_per_px, map.scale_from));
   image::Grey16 black{width, height, {}};
   black.pixels.resize(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
   empty_ = calibration::empty_calibration(black, map.crop, map.mm_per_px, map.lens);

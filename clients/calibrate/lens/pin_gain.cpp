@@ -8,6 +8,7 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 #include <stdexcept>
+#include <utility>
 
 namespace dtact::ctl {
 namespace {
@@ -139,6 +140,17 @@ PinGain choose_gain(const cv::Mat1f& reference, const cv::Mat1f& frame, std::spa
     }
   }
   return chosen;
+}
+
+BoardLens measure_board(const cv::Mat1f& reference, const cv::Mat1f& frame, const Board& board,
+                        double smoothing_mm) {
+  PinPress pins = find_pins(reference, frame, board);
+  PinGain gain = choose_gain(reference, frame, pins.marks,
+                             smoothing_mm / recon::central_mm_per_px(pins.lens.lens));
+  const PinShift shift =
+      measure_pin_shift(reference, frame, pins.marks, pins.lens.lens, board.pitch_mm);
+  if (shift.sure()) pins.lens.lens = undeformed(pins.lens.lens, shift);
+  return {std::move(pins), std::move(gain), shift};
 }
 
 }  // namespace dtact::ctl

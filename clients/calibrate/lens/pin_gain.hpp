@@ -5,6 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "clients/calibrate/lens/pin_shift.hpp"
+#include "clients/calibrate/lens/pins.hpp"
 #include "clients/calibrate/lens/point_fit.hpp"
 #include "daemon/recon/flat_field_gain.hpp"
 
@@ -33,5 +35,15 @@ struct PinGain {
 /// `smoothing_px`: standard deviation of the Gaussian with which the darkening is read.
 [[nodiscard]] PinGain choose_gain(const cv::Mat1f& reference, const cv::Mat1f& frame,
                                   std::span<const Mark> marks, double smoothing_px);
+
+/// What one press of a board of pins shows.
+struct BoardLens {
+  PinPress pins;  ///< With the lens of the undeformed surface, where `shift` is sure.
+  PinGain gain;
+  PinShift shift;
+};
+/// Throws as find_pins().
+[[nodiscard]] BoardLens measure_board(const cv::Mat1f& reference, const cv::Mat1f& frame,
+                                      const Board& board, double smoothing_mm);
 
 }  // namespace dtact::ctl

@@ -197,10 +197,12 @@ void refuse_exchanged(const Darkening& image, const Settled& settled, const Boar
     for (int col = 0; col + 1 < lattice.cols; ++col) {
       const Point corner = place_mm(board, lattice, row, col);
       std::vector<double> levels;
-      for (int i = 0; i < kSamples * kSamples; ++i) {
-        const Point mm{corner.x + board.pitch_mm * (i % kSamples + 0.5) / kSamples,
-                       corner.y + board.pitch_mm * (i / kSamples + 0.5) / kSamples};
-        levels.push_back(at_nearest(image.levels, project(settled.lens, mm)));
+      for (int y = 0; y < kSamples; ++y) {
+        for (int x = 0; x < kSamples; ++x) {
+          const Point mm{corner.x + board.pitch_mm * (x + 0.5) / kSamples,
+                         corner.y + board.pitch_mm * (y + 0.5) / kSamples};
+          levels.push_back(at_nearest(image.levels, project(settled.lens, mm)));
+        }
       }
       const double mean =
           std::accumulate(levels.begin(), levels.end(), 0.0) / static_cast<double>(levels.size());

@@ -36,8 +36,11 @@ void run(const Options& options) {
   std::vector<float> mm =
       calibration::mean_depth_um(model, reference.mean_q8().pixels, frame.frames());
   for (float& value : mm) value *= 0.001F;
-  base::write_file_atomically(
-      options.output, encode({model.rectify.width, model.rectify.height, model.mm_per_px, mm}));
+  base::write_file_atomically(options.output, encode({.width = model.rectify.width,
+                                                      .height = model.rectify.height,
+                                                      .mm_per_px = model.mm_per_px,
+                                                      .mm = mm,
+                                                      .surface = model.surface}));
 
   float deepest = 0;
   std::size_t untrusted = 0;

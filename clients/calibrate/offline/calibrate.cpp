@@ -43,11 +43,13 @@ Made make_published(const DepthOptions& options) {
                                      .mm_per_px = map.mm_per_px,
                                      .lens = map.lens,
                                      .crop = map.crop,
+                                     .view = map.view,
                                      .gain = map.gain,
                                      .method = recon::Method::published};
   calibration::Calibration made = calibration::build(press);
   made.origin = recorded_origin(options.reference);
   made.origin.created = utc_now();
+  made.origin.scale_from = map.scale_from;
   made.origin.sources = reference.sources;
   made.origin.sources.insert(made.origin.sources.end(), ball.sources.begin(), ball.sources.end());
   std::vector<std::string> doubts = calibration::doubts_about(made, press);
@@ -89,12 +91,7 @@ void run(const DepthOptions& options) {
   check(options);
   const auto [made, doubts] =
       options.method == "published" ? make_published(options) : make_lut(options);
-  if (!doubts.empty() && !options.force) {
-    throw std::runtime_error(fmt::format("{}; nothing was written (--force writes it as it is)",
-                                         fmt::join(doubts, "; ")));
-  }
-  for (const std::string& doubt : doubts) fmt::print("doubtful: {}\n", doubt);
-  calibration::save(made, options.output);
+  save_or_refuse(made, doubts, options.force, options.output);
   const recon::RectifyTable& map = made.model->rectify;
   fmt::print("{}: method {}, {}x{} at column {}, row {}\n", options.output, options.method,
              map.width, map.height, made.crop_col, made.crop_row);

@@ -8,7 +8,9 @@
 #include "clients/calibrate/fit/build.hpp"
 #include "clients/calibrate/lens/chessboard.hpp"
 #include "clients/calibrate/lens/pin_gain.hpp"
+#include "clients/calibrate/lens/pin_shift.hpp"
 #include "clients/calibrate/lens/pins.hpp"
+#include "clients/calibrate/offline/depth_build.hpp"
 #include "clients/calibrate/offline/images.hpp"
 #include "clients/calibrate/offline/offline.hpp"
 #include "clients/common/program.hpp"
@@ -26,14 +28,17 @@ struct LensOptions {
   std::vector<std::string> chessboard;
   std::string squares;
   double square_mm = 0;
+  double camera_mm = 0;
   std::string output;
 };
 
 void write(const LensOptions& options, const ImageSet& images, const ChosenLens& chosen,
-           const std::optional<recon::FlatFieldGain>& gain, const std::vector<std::string>& what) {
-  calibration::LensFile file{images.width(), images.height(),
-                             chosen.lens,    gain.value_or(recon::FlatFieldGain{}),
-                             what,           gain.has_value()};
+           const std::optional<recon::FlatFieldGain>& gain, const PinShift& shift,
+           const std::vector<std::string>& what) {
+  calibration::LensFile file{
+      images.width(), images.height(),  chosen.lens, gain.value_or(recon::FlatFieldGain{}),
+      what,           gain.has_value(), {}};
+  file.view = view_of(shift, options.camera_mm);
   recon::check(file.lens, file.frame_width, file.frame_height);
   file.notes.push_back(
       fmt::format("RMS distance from the ideal places: {:.4f} mm, each left out of "
@@ -51,18 +56,16 @@ void run_board(const LensOptions& options) {
   const ImageSet pressed = load_images(options.board, "--board");
   require_same_size(reference, "--board-reference", pressed, "--board");
   const auto [rows, cols] = pair_of(options.pins, "--pins");
-  const cv::Mat1f reference_image = mean_levels(reference);
-  const cv::Mat1f frame = mean_levels(pressed);
-  const PinPress press = find_pins(reference_image, frame, {rows, cols, options.pitch_mm});
-  const PinGain gain =
-      choose_gain(reference_image, frame, press.marks,
-                  calibration::kSmoothingMm / recon::central_mm_per_px(press.lens.lens));
+  const auto [press, gain, shift] =
+      measure_board(mean_levels(reference), mean_levels(pressed), {rows, cols, options.pitch_mm},
+                    calibration::kSmoothingMm);
   std::string what =
       fmt::format("{}x{} pins, {} mm apart", press.rows, press.cols, options.pitch_mm);
   if (!press.missing.empty()) {
     what += fmt::format("; not found: {}", fmt::join(press.missing, "; "));
   }
-  write(options, reference, press.lens, gain.gain, {what, gain.describe()});
+  write(options, reference, press.lens, gain.gain, shift,
+        {what, gain.describe(), shift.describe()});
 }
 
 void run_chessboard(const LensOptions& options) {
@@ -73,7 +76,7 @@ void run_chessboard(const LensOptions& options) {
   for (const auto& source : images.sources) names.push_back(source.name);
   const ChessboardLens made =
       calibrate_chessboards(grey_images(images), names, {cols, rows, options.square_mm});
-  write(options, images, made.lens, std::nullopt,
+  write(options, images, made.lens, std::nullopt, {.foot_mm = axis_foot(made.lens.lens)},
         {fmt::format("chessboard of {}x{} squares of {} mm, {} image(s)", cols, rows,
                      options.square_mm, images.images.size())});
 }
@@ -119,6 +122,7 @@ void add_calibrate_lens(CLI::App& app) {
                   ->type_name("CxR"))
       ->needs(lens->add_option("--square-mm", options->square_mm, "Side of a square, mm")
                   ->check(cli::in_range(0.1, 100.0)));
+  add_camera_option(*lens, options->camera_mm, "as the pins show");
   lens->add_option("-o,--output", options->output, "Lens file to write (TOML)")
       ->type_name("FILE")
       ->required();

@@ -2,11 +2,15 @@
 
 #include <fmt/chrono.h>
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
+#include <algorithm>
+#include <cmath>
 #include <ctime>
 #include <filesystem>
 #include <stdexcept>
 
+#include "clients/calibrate/fit/camera_height.hpp"
 #include "clients/calibrate/fit/evaluate.hpp"
 #include "clients/calibrate/fit/model/auto_build.hpp"
 #include "clients/calibrate/fit/model/model_build.hpp"
@@ -17,6 +21,9 @@ namespace dtact::ctl {
 namespace {
 
 namespace fs = std::filesystem;
+
+constexpr double kMinScale = 0.001;  // mm per pixel
+constexpr double kMaxScale = 1.0;
 
 std::optional<calibration::Crop> crop_of(const MapOptions& options, int width, int height) {
   if (options.crop.empty()) {
@@ -40,6 +47,30 @@ calibration::LensFile lens_for(const std::string& path, int width, int height) {
   return file;
 }
 
+/// Throws where a pixel's error at both ends would be more than two percent of the scale.
+double scale_of(const std::vector<double>& ruler, int width, int height) {
+  const auto outside = [](double at, int size) { return !(at >= 0 && at < size); };
+  if (outside(ruler[0], width) || outside(ruler[1], height) || outside(ruler[2], width) ||
+      outside(ruler[3], height)) {
+    throw std::runtime_error(
+        fmt::format("--ruler: a point is outside of the picture of {}x{} pixels", width, height));
+  }
+  const double pixels = std::hypot(ruler[2] - ruler[0], ruler[3] - ruler[1]);
+  if (!(pixels >= 100)) {
+    throw std::runtime_error(fmt::format(
+        "--ruler: the points are {:.0f} pixels apart, which gives no exact scale; at least 100 are "
+        "needed",
+        pixels));
+  }
+  const double scale = ruler[4] / pixels;
+  if (!(scale >= kMinScale && scale <= kMaxScale)) {
+    throw std::runtime_error(
+        fmt::format("--ruler: {} mm on {:.1f} pixels is {:.5f} mm per pixel, allowed are {} to {}",
+                    ruler[4], pixels, scale, kMinScale, kMaxScale));
+  }
+  return scale;
+}
+
 /// Splits "FOLDER@0.8" into the images and the measured depth.
 std::pair<std::string, std::optional<double>> split_press(const std::string& text) {
   const std::size_t at = text.rfind('@');
@@ -60,15 +91,27 @@ std::pair<std::string, std::optional<double>> split_press(const std::string& tex
 }  // namespace
 
 void add_map_options(CLI::App& command, MapOptions& options) {
-  command
-      .add_option("--mm-per-px", options.mm_per_px,
-                  "Scale of the depth map, mm per pixel (default: the lens's in the middle)")
-      ->check(cli::in_range(0.001, 1.0));
+  CLI::Option* scale =
+      command
+          .add_option("--mm-per-px", options.mm_per_px,
+                      "Scale of the depth map, mm per pixel (default: the lens's in the middle)")
+          ->check(cli::in_range(kMinScale, kMaxScale));
+  CLI::Option* ruler =
+      command
+          .add_option("--ruler", options.ruler,
+                      "The scale from a ruler or coin pressed in: two points of the picture of "
+                      "dtactctl snapshot --luma, pixels, and their distance, mm")
+          ->delimiter(',')
+          ->expected(5)
+          ->type_name("X,Y,X,Y,MM")
+          ->excludes(scale);
   command
       .add_option("--lens", options.lens,
                   "Lens file of calibrate lens, or a calibration folder: rectifies the map; a "
                   "LUT of one press takes its gain as well, several presses tell their own")
-      ->type_name("FILE");
+      ->type_name("FILE")
+      ->excludes(ruler);
+  add_camera_option(command, options.camera_mm, "the lens file's, or as four presses show");
   command
       .add_option("--centre", options.centre,
                   "Middle of the crop in the frame (default: the frame's)")
@@ -81,19 +124,66 @@ void add_map_options(CLI::App& command, MapOptions& options) {
       ->type_name("W,H");
 }
 
+void add_camera_option(CLI::App& command, double& camera_mm, const std::string& otherwise) {
+  command
+      .add_option("--camera-mm", camera_mm,
+                  "Height of the camera's pinhole above the surface as it looks through the gel, "
+                  "mm, where a drawing says it (default: " +
+                      otherwise + ")")
+      ->check(cli::in_range(5.0, 1000.0));
+}
+
+calibration::CameraView view_of(const PinShift& shift, double camera_mm) {
+  if (camera_mm > 0) return {shift.foot_mm, calibration::HeightSource::drawing, 1 / camera_mm};
+  if (!shift.sure()) {
+    return {shift.foot_mm, calibration::HeightSource::assumed, calibration::kAssumedPerMm};
+  }
+  return {shift.foot_mm, calibration::HeightSource::board, 0, shift.per_level, shift.error};
+}
+
 MapChoice choose_map(const MapOptions& options, int frame_width, int frame_height) {
   MapChoice map{.lens = {},
                 .gain = {},
                 .mm_per_px = options.mm_per_px,
+                .scale_from = "--mm-per-px",
                 .crop = crop_of(options, frame_width, frame_height)};
   if (!options.lens.empty()) {
     const calibration::LensFile file = lens_for(options.lens, frame_width, frame_height);
     map.lens = file.lens;
     map.gain = file.gain;
     map.gain_specified = file.gain_specified;
-    if (map.mm_per_px == 0) map.mm_per_px = recon::central_mm_per_px(*map.lens);
+    map.view = file.view;
+    if (map.mm_per_px == 0) {
+      map.mm_per_px = recon::central_mm_per_px(*map.lens);
+      map.scale_from = "the lens";
+    }
+  } else if (!options.ruler.empty()) {
+    map.mm_per_px = scale_of(options.ruler, frame_width, frame_height);
+    map.scale_from =
+        fmt::format("a ruler, {} mm from {}, {} to {}, {}", options.ruler[4], options.ruler[0],
+                    options.ruler[1], options.ruler[2], options.ruler[3]);
   } else if (map.mm_per_px == 0) {
-    throw std::runtime_error("--mm-per-px or --lens is required: one of them says the scale");
+    throw std::runtime_error(
+        "the scale of the picture is missing. From a board of pins: dtact-calibrate lens, then "
+        "--lens. From a ruler or coin: press it in, dtactctl snapshot --luma -o ruler.png, then "
+        "--ruler X,Y,X,Y,MM with two of its points and their distance. Known: --mm-per-px");
+  }
+  if (map.view.source == calibration::HeightSource::unknown) {
+    map.view.source = calibration::HeightSource::assumed;
+    map.view.per_mm = calibration::kAssumedPerMm;
+    if (map.lens) {
+      map.view.foot_mm = axis_foot(*map.lens);
+    } else if (map.crop) {
+      // The camera's axis is taken to be in the middle of the frame.
+      map.view.foot_mm = {
+          map.mm_per_px * 0.5 * (frame_width - map.crop->width - 2 * map.crop->col),
+          map.mm_per_px * 0.5 * (frame_height - map.crop->height - 2 * map.crop->row)};
+    }
+  }
+  if (options.camera_mm > 0) {
+    map.view.source = calibration::HeightSource::drawing;
+    map.view.per_mm = 1 / options.camera_mm;
+    map.view.error = 0;
   }
   return map;
 }
@@ -108,9 +198,11 @@ PressImages begin_presses(const std::vector<std::string>& reference, double ball
                              .mm_per_px = choice.mm_per_px,
                              .crop = choice.crop,
                              .lens = choice.lens,
+                             .view = choice.view,
                              .gain_specified = choice.gain_specified},
                      .gain = choice.gain,
                      .origin = recorded_origin(reference)};
+  images.origin.scale_from = choice.scale_from;
   images.origin.sources = reference_image.sources;
   return images;
 }
@@ -151,12 +243,20 @@ calibration::Calibration build_lut(const PressImages& images, FitMethod method,
                                    calibration::PressReport* report) {
   calibration::PressReport found;
   calibration::Calibration made;
+  calibration::BallPresses set = images.set;
+  if (set.view.per_mm == 0 && set.view.source != calibration::HeightSource::unknown) {
+    // A LUT at the assumed height turns the board's grey levels into millimetres.
+    calibration::PressReport unused;
+    set.view = calibration::view_with(
+        set.view, calibration::build_from_sphere(set, images.gain, unused).model->lut);
+  }
+  set.view = calibration::view_of_presses(set);
   if (method == FitMethod::automatic) {
-    made = calibration::build_auto(images.set, images.gain, found);
+    made = calibration::build_auto(set, images.gain, found);
   } else if (method == FitMethod::alone) {
-    made = calibration::build_from_sphere(images.set, images.gain, found);
+    made = calibration::build_from_sphere(set, images.gain, found);
   } else {
-    calibration::FittedCalibration fitted = calibration::build_model(images.set, images.gain);
+    calibration::FittedCalibration fitted = calibration::build_model(set, images.gain);
     found.note = fitted.describe_press();
     found.left_out = std::move(fitted.left_out);
     found.presses = std::move(fitted.presses);
@@ -169,11 +269,22 @@ calibration::Calibration build_lut(const PressImages& images, FitMethod method,
   if (method != FitMethod::alone || images.set.presses.size() == 1) {
     add_note(calibration::gain_left_out(images.gain, made));
   }
-  add_note(calibration::dim_part_of(made, images.set));
+  add_note(calibration::describe(made.view));
+  add_note(calibration::dim_part_of(made, set));
   made.origin = images.origin;
   made.origin.created = utc_now();
   if (report != nullptr) *report = std::move(found);
   return made;
+}
+
+void save_or_refuse(const calibration::Calibration& made, const std::vector<std::string>& doubts,
+                    bool force, const std::string& folder, const std::string& hint) {
+  if (!doubts.empty() && !force) {
+    throw std::runtime_error(fmt::format("{}{}; nothing was written (--force writes it as it is)",
+                                         fmt::join(doubts, "; "), hint));
+  }
+  for (const std::string& doubt : doubts) fmt::print("doubtful: {}\n", doubt);
+  calibration::save(made, folder);
 }
 
 calibration::Origin recorded_origin(const std::vector<std::string>& paths) {

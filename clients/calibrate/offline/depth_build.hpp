@@ -7,19 +7,23 @@
 #include <vector>
 
 #include "clients/calibrate/fit/press_set.hpp"
+#include "clients/calibrate/lens/pin_shift.hpp"
 #include "clients/calibrate/offline/images.hpp"
 
 namespace dtact::ctl {
 
 /// Position of the depth map in the frame and size of its pixels, from the command line.
 struct MapOptions {
-  double mm_per_px = 0;  ///< 0: the lens's in the middle.
+  double mm_per_px = 0;  ///< 0: the lens's in the middle, or the ruler's.
+  /// x, y of two points of the picture, pixels, and their distance, mm; or empty.
+  std::vector<double> ruler;
+  double camera_mm = 0;  ///< Of the camera above the surface; 0: the lens file's.
   std::string lens;  ///< A lens file or a calibration folder; empty: the frame is not rectified.
   std::vector<int> centre;  ///< x, y in pixels; empty: the frame's.
   std::vector<int> crop;    ///< Width, height in pixels; empty: the whole frame.
 };
 
-/// Adds --mm-per-px, --lens, --centre and --crop.
+/// Adds --mm-per-px, --ruler, --lens, --centre and --crop.
 void add_map_options(CLI::App& command, MapOptions& options);
 
 /// The same, for a frame of known size.
@@ -28,12 +32,20 @@ struct MapChoice {
   recon::FlatFieldGain gain;    ///< From the lens file: the gain of its board's pins.
   bool gain_specified = false;  ///< LensFile::gain_specified.
   double mm_per_px = 0;
+  std::string scale_from;  ///< calibration::Origin::scale_from.
   std::optional<calibration::Crop> crop;
+  calibration::CameraView view = {};
 };
 
-/// Throws std::runtime_error naming the option when neither scale nor lens is given, the lens
-/// is for another frame size or the centre is given alone.
+/// Throws std::runtime_error naming the option when there is no scale, ruler or lens, the ruler's
+/// points are no good, the lens is for another frame size or the centre is given alone.
 [[nodiscard]] MapChoice choose_map(const MapOptions& options, int frame_width, int frame_height);
+
+/// --camera-mm; `otherwise` is what holds without it.
+void add_camera_option(CLI::App& command, double& camera_mm, const std::string& otherwise);
+/// The camera's place: above the foot that a board shows, as high as `camera_mm` says; where that
+/// is 0, as the board shows in grey levels, or the assumed height.
+[[nodiscard]] calibration::CameraView view_of(const PinShift& shift, double camera_mm);
 
 /// Several presses of one ball, and the record of their origin.
 struct PressImages {
@@ -68,6 +80,11 @@ void add_press(PressImages& images, const std::vector<std::string>& paths, const
 /// calibration::build_auto() and build_model().
 [[nodiscard]] calibration::Calibration build_lut(const PressImages& images, FitMethod method,
                                                  calibration::PressReport* report);
+
+/// Writes the calibration to `folder` and prints its doubts. Throws std::runtime_error with them
+/// and `hint` instead, unless `force`.
+void save_or_refuse(const calibration::Calibration& made, const std::vector<std::string>& doubts,
+                    bool force, const std::string& folder, const std::string& hint = {});
 
 /// Camera and light of the images in these folders, from a sensor.toml.
 [[nodiscard]] calibration::Origin recorded_origin(const std::vector<std::string>& paths);

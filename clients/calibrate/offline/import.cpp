@@ -13,6 +13,7 @@
 #include "clients/calibrate/fit/evaluate.hpp"
 #include "clients/calibrate/fit/published.hpp"
 #include "clients/calibrate/lens/pin_gain.hpp"
+#include "clients/calibrate/lens/pin_shift.hpp"
 #include "clients/calibrate/lens/pins.hpp"
 #include "clients/calibrate/offline/depth_build.hpp"
 #include "clients/calibrate/offline/images.hpp"
@@ -30,6 +31,7 @@ struct ImportOptions {
   std::string pins;
   double pitch_mm = 0;
   double radius_mm = 0;
+  double camera_mm = 0;
   std::string output = "cal";
   bool force = false;
 };
@@ -94,7 +96,8 @@ Pictures load(const ImportPictures& files, const ImportSettings& settings) {
   require_same_size(pictures.ball, files.ball.string(), pictures.board_reference, first);
   const int width = pictures.ball.width();
   const int height = pictures.ball.height();
-  if (settings.width && (settings.width->value != width || settings.height->value != height)) {
+  if (settings.width && settings.height &&
+      (settings.width->value != width || settings.height->value != height)) {
     throw std::runtime_error(fmt::format(
         "{} is {}x{} but {} says {:g}x{:g}: take the pictures as the camera gives them, not "
         "rectified or cropped ones, or correct the resolution",
@@ -103,23 +106,8 @@ Pictures load(const ImportPictures& files, const ImportSettings& settings) {
   return pictures;
 }
 
-struct BoardLens {
-  PinPress pins;
-  PinGain gain;
-};
-
-BoardLens measure_board(const Pictures& pictures, const ImportSettings& settings) {
-  const cv::Mat1f reference = mean_levels(pictures.board_reference);
-  const cv::Mat1f frame = mean_levels(pictures.board);
-  const Board board{static_cast<int>(settings.rows.value), static_cast<int>(settings.cols.value),
-                    settings.pitch_mm.value};
-  PinPress pins = find_pins(reference, frame, board);
-  PinGain gain = choose_gain(reference, frame, pins.marks,
-                             calibration::kSmoothingMm / recon::central_mm_per_px(pins.lens.lens));
-  return {std::move(pins), std::move(gain)};
-}
-
-PressImages press_of(const Pictures& pictures, const BoardLens& board, double radius_mm) {
+PressImages press_of(const Pictures& pictures, const BoardLens& board, double radius_mm,
+                     double camera_mm) {
   const recon::Lens& lens = board.pins.lens.lens;
   PressImages images{.set = {.reference_q8 = pictures.ball_reference.mean_q8(),
                              .presses = {{.name = "the ball",
@@ -129,9 +117,11 @@ PressImages press_of(const Pictures& pictures, const BoardLens& board, double ra
                              .mm_per_px = recon::central_mm_per_px(lens),
                              .crop = {},
                              .lens = lens,
+                             .view = view_of(board.shift, camera_mm),
                              .gain_specified = true},
                      .gain = board.gain.gain,
                      .origin = {}};
+  images.origin.scale_from = "the lens";
   for (const ImageSet* set :
        {&pictures.board_reference, &pictures.board, &pictures.ball_reference, &pictures.ball}) {
     images.origin.sources.insert(images.origin.sources.end(), set->sources.begin(),
@@ -145,7 +135,7 @@ PressImages press_of(const Pictures& pictures, const BoardLens& board, double ra
 void refuse_exchanged(const PressImages& images) {
   const calibration::BallPresses& set = images.set;
   const calibration::Calibration plain =
-      calibration::empty_calibration(set.reference_q8, set.crop, set.mm_per_px, set.lens);
+      calibration::empty_calibration(set.reference_q8, set.crop, set.mm_per_px, set.lens, set.view);
   std::vector<float> levels = calibration::smoothed_darkening(*plain.model, set.reference_q8.pixels,
                                                               set.presses.front().frames)
                                   .levels;
@@ -177,8 +167,8 @@ Published read_published(const ImportPictures& files, const PressImages& images)
       {}};
   try {
     const std::vector<image::Grey8>& frames = set.presses.front().frames;
-    calibration::Calibration made =
-        calibration::empty_calibration(set.reference_q8, set.crop, set.mm_per_px, set.lens);
+    calibration::Calibration made = calibration::empty_calibration(
+        set.reference_q8, set.crop, set.mm_per_px, set.lens, set.view);
     auto model = std::make_shared<recon::Model>(*made.model);
     model->method = recon::Method::published;
     model->lut = table ? calibration::published_lut(read_depth_table(files.depth_table))
@@ -205,7 +195,7 @@ void print_board(const BoardLens& board, const ImportSettings& settings) {
   if (!board.pins.missing.empty()) {
     fmt::print("not found: {}\n", fmt::join(board.pins.missing, "; "));
   }
-  fmt::print("{}\n", board.gain.describe());
+  fmt::print("{}\n{}\n", board.gain.describe(), board.shift.describe());
 }
 
 void print_ball(const calibration::Evaluation& ours, const Published& published,
@@ -228,10 +218,13 @@ void print_ball(const calibration::Evaluation& ours, const Published& published,
     fmt::print("  {}: cannot be compared: {}\n", published.name, published.why_not);
   }
   if (ours.sector_mae_mm && ours.half_mae_mm && ours.half_worst_mm) {
+    const double depth_mm =
+        calibration::sag_mm(ours.contact.ball_radius_mm, ours.contact.radius_mm);
     fmt::print(
         "this calibration, made from a part of the press, on the rest: {:.4f} mm mean over "
-        "sectors, {:.4f} mm over halves (at worst {:.4f} mm)\n",
-        *ours.sector_mae_mm, *ours.half_mae_mm, *ours.half_worst_mm);
+        "sectors ({:.1f} % of the sphere's depth), {:.4f} mm over halves (at worst {:.4f} mm)\n",
+        *ours.sector_mae_mm, 100 * *ours.sector_mae_mm / depth_mm, *ours.half_mae_mm,
+        *ours.half_worst_mm);
   }
 }
 
@@ -249,8 +242,12 @@ void run(const ImportOptions& options) {
   const ImportPictures files = find_pictures(options.folder);
   const ImportSettings settings = settings_of(options);
   const Pictures pictures = load(files, settings);
-  const BoardLens board = about(both(files.board_reference, files.board),
-                                [&] { return measure_board(pictures, settings); });
+  const BoardLens board = about(both(files.board_reference, files.board), [&] {
+    return measure_board(mean_levels(pictures.board_reference), mean_levels(pictures.board),
+                         {static_cast<int>(settings.rows.value),
+                          static_cast<int>(settings.cols.value), settings.pitch_mm.value},
+                         calibration::kSmoothingMm);
+  });
   print_board(board, settings);
   const std::string ball_files = both(files.ball_reference, files.ball);
   const std::string hint = fmt::format(
@@ -259,7 +256,7 @@ void run(const ImportOptions& options) {
       settings.radius_mm.value, settings.radius_mm.by, settings.pitch_mm.value,
       settings.pitch_mm.by);
   calibration::PressReport report;
-  const PressImages images = press_of(pictures, board, settings.radius_mm.value);
+  const PressImages images = press_of(pictures, board, settings.radius_mm.value, options.camera_mm);
   about(ball_files, [&] { refuse_exchanged(images); });
   const calibration::Calibration made =
       about(ball_files, [&] { return build_lut(images, FitMethod::automatic, &report); }, hint);
@@ -274,13 +271,7 @@ void run(const ImportOptions& options) {
   std::vector<std::string> doubts = calibration::doubts_about(made.model->lut);
   std::ranges::move(calibration::doubts_about(ours), std::back_inserter(doubts));
   print_ball(ours, read_published(files, images), settings);
-  if (!doubts.empty() && !options.force) {
-    throw std::runtime_error(
-        fmt::format("{}: {}{}; nothing was written (--force writes it as it is)", ball_files,
-                    fmt::join(doubts, "; "), hint));
-  }
-  for (const std::string& doubt : doubts) fmt::print("doubtful: {}\n", doubt);
-  calibration::save(made, options.output);
+  about(ball_files, [&] { save_or_refuse(made, doubts, options.force, options.output, hint); });
   const recon::RectifyTable& map = made.model->rectify;
   const double scale = made.model->mm_per_px;
   fmt::print(
@@ -319,6 +310,7 @@ void add_import(CLI::App& app) {
       ->add_option("--radius-mm", options->radius_mm,
                    "Radius of the ball, mm (default: the configuration's, or 4)")
       ->check(cli::in_range(0.2, 99.0));
+  add_camera_option(*command, options->camera_mm, "as the pins show");
   command
       ->add_option("-o,--output", options->output,
                    "Folder to write; an old calibration is replaced")

@@ -4,14 +4,14 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <bit>
 #include <charconv>
 #include <cmath>
-#include <cstdint>
 #include <sstream>
 #include <stdexcept>
 #include <string_view>
+#include <utility>
 
+#include "clients/common/depth_file.hpp"
 #include "hal/base/atomic_file.hpp"
 
 namespace dtact::ctl {
@@ -203,40 +203,14 @@ void read_shape_config(const fs::path& file, ImportSettings& settings) {
   });
 }
 
-// https://numpy.org/doc/stable/reference/generated/numpy.lib.format.html
 std::vector<double> read_depth_table(const fs::path& file) {
-  const std::string bytes = base::read_file(file, 1U << 20U);
-  const auto refuse = [&file] {
-    fail(file,
-         "is no row of 3 to 256 depths in millimetres as NumPy saves it (float64 or float32)");
-  };
-  const auto unsigned_at = [&bytes](std::size_t at, std::size_t count) {
-    std::size_t value = 0;
-    for (std::size_t i = count; i-- > 0;)
-      value = value << 8U | static_cast<std::uint8_t>(bytes[at + i]);
-    return value;
-  };
-  if (bytes.size() < 12 || !bytes.starts_with("\x93NUMPY")) refuse();
-  const std::size_t length = bytes[6] == 1 ? 2 : 4;
-  const std::size_t head = 8 + length;
-  const std::size_t data = head + unsigned_at(8, length);
-  if (data > bytes.size()) refuse();
-  const std::string_view header = std::string_view(bytes).substr(head, data - head);
-  const std::size_t size = header.find("'<f8'") != std::string_view::npos   ? 8
-                           : header.find("'<f4'") != std::string_view::npos ? 4
-                                                                            : 0;
-  if (size == 0) refuse();
-  const std::size_t count = (bytes.size() - data) / size;
-  const bool row = header.find(fmt::format("({},)", count)) != std::string_view::npos;
-  if (!row || count < 3 || count > 256 || data + count * size != bytes.size()) refuse();
-  std::vector<double> depths(count);
-  for (std::size_t i = 0; i < count; ++i) {
-    const std::uint64_t bits = unsigned_at(data + i * size, size);
-    depths[i] = size == 8 ? std::bit_cast<double>(bits)
-                          : double{std::bit_cast<float>(static_cast<std::uint32_t>(bits))};
-    if (!(std::abs(depths[i]) < 16)) refuse();
+  cli::NpyArray table = cli::read_npy(file);
+  constexpr double kMaxMm = 16;
+  if (table.shape.size() != 1 || table.values.size() < 3 || table.values.size() > 256 ||
+      !std::ranges::all_of(table.values, [](double mm) { return std::abs(mm) < kMaxMm; })) {
+    fail(file, "is no row of 3 to 256 depths in millimetres");
   }
-  return depths;
+  return std::move(table.values);
 }
 
 }  // namespace dtact::ctl

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "clients/common/depth_message.hpp"
 #include "daemon/pipeline/depth/uncertainty.hpp"
 
 namespace dtact::reprocess {
@@ -88,7 +89,9 @@ void DepthReprocessor::remake(const hal::LumaView& luma, v1::Frame& frame) {
   if (resolution.coarse) {
     resolution.coarse->upsampler.run(resolution.coarse->depth_um, depth_um_);
   }
-  summary_ = contact_.inspect(sums, model.rectify.width, model.rectify.height, model.mm_per_px);
+  summary_ = contact_.inspect(sums, model.rectify.width, model.rectify.height, model.mm_per_px,
+                              model.surface.view);
+  cli::set_surface(model.surface, frame);
 
   v1::DepthMap map;
   map.set_encoding(v1::DEPTH_PREDICT_ZSTD);

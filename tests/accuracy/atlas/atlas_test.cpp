@@ -213,7 +213,8 @@ double greatest_true_difference(const hal::sim::Truth& truth, std::size_t a, std
   return static_cast<double>(greatest);
 }
 
-/// A round object whose indentation is that of a ball 1 mm deep, blurred by `sigma_mm`.
+/// A round object whose indentation the camera sees as that of a ball 1 mm deep, blurred by
+/// `sigma_mm`.
 hal::sim::Object blunted_ball(double sigma_mm, double& depth_mm) {
   const auto truth = solve({{hal::sim::ball(5), 0, 0, 1.0}});
   std::vector<float> map;
@@ -240,10 +241,18 @@ hal::sim::Object blunted_ball(double sigma_mm, double& depth_mm) {
     profile.push_back(sum / weights);
   }
   depth_mm = profile.front();
-  return {"blunted_ball", 4.5, [profile](double x, double y) {
-            const auto i = static_cast<std::size_t>(std::hypot(x, y) / kStep);
-            return i < profile.size() && profile[i] > 0 ? profile.front() - profile[i]
-                                                        : hal::sim::kNoSurface;
+  const double per_mm = 1 / truth->scene().surface.camera_mm;
+  return {"blunted_ball", 4.5, [profile, per_mm](double x, double y) {
+            const auto at = [&profile](double seen) {
+              const auto i = static_cast<std::size_t>(seen / kStep);
+              return i < profile.size() ? profile[i] : 0;
+            };
+            // What is pressed in appears farther from the camera's axis, which is the middle.
+            double seen = std::hypot(x, y);
+            for (int round = 0; round < 4; ++round) {
+              seen = std::hypot(x, y) / (1 - per_mm * std::max(0.0, at(seen)));
+            }
+            return at(seen) > 0 ? profile.front() - at(seen) : hal::sim::kNoSurface;
           }};
 }
 

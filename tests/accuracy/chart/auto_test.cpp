@@ -39,7 +39,8 @@ calibration::Calibration from_one_press(const image::Grey16& reference) {
                              .ball_radius_mm = 4.0,
                              .mm_per_px = kMmPerPx,
                              .lens = {},
-                             .crop = calibration::Crop{kCropCol, kCropRow, kSide, kSide}});
+                             .crop = calibration::Crop{kCropCol, kCropRow, kSide, kSide},
+                             .view = kView});
 }
 
 /// The scripted run under one bound of the error.

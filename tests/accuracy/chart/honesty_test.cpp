@@ -101,6 +101,7 @@ std::vector<Press> presses_on(const Specimen& specimen) {
 /// Solves the presses one after another, at the times that table::first_still_frame() expects.
 std::shared_ptr<const hal::sim::Truth> solve(Scene scene, const std::vector<Press>& presses) {
   scene.gel.solve_step_mm = 5;
+  scene.surface.camera_mm = 0;  // the LUT and its stated error are the subject, not perspective
   scene.loop_from_s = scene.loop_to_s = 0;
   scene.presses.clear();
   double begin_s = 1;
@@ -124,6 +125,7 @@ calibration::Calibration of_one(const calibration::BallPresses& set, recon::Meth
                              .mm_per_px = set.mm_per_px,
                              .lens = {},
                              .crop = set.crop,
+                             .view = set.view,
                              .method = method});
 }
 

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "daemon/calibration/calibration.hpp"
 #include "hal/files/png.hpp"
 #include "hal/sim/renderer.hpp"
 
@@ -17,6 +18,9 @@ inline constexpr int kSide = 580;    ///< Pixels of the crop, both ways.
 inline constexpr int kCropCol = (kWidth - kSide) / 2;
 inline constexpr int kCropRow = (kHeight - kSide) / 2;
 inline constexpr double kMmPerPx = 0.0413793;
+/// The simulated camera's place, as its drawing would say it.
+inline constexpr calibration::CameraView kView{
+    .foot_mm = {}, .source = calibration::HeightSource::drawing, .per_mm = 1.0 / 28};
 
 /// An object at rest on the sensor.
 struct Shot {

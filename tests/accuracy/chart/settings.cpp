@@ -23,6 +23,7 @@ std::shared_ptr<const recon::Model> calibrate(const image::Grey16& reference, co
                              .mm_per_px = kMmPerPx,
                              .lens = {},
                              .crop = calibration::Crop{kCropCol, kCropRow, kSide, kSide},
+                             .view = kView,
                              .method = method})
       .model;
 }
@@ -57,6 +58,7 @@ calibration::BallPresses press_set(const image::Grey16& reference, const std::ve
   }
   set.ball_radius_mm = 4.0;
   set.mm_per_px = kMmPerPx;
+  set.view = kView;
   set.crop = calibration::Crop{kCropCol, kCropRow, kSide, kSide};
   return set;
 }

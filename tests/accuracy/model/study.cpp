@@ -111,6 +111,8 @@ std::vector<Specimen> specimens() {
                              .knots = {},
                              .slopes = {}}));
   all.push_back({"another law", table::another_law()});
+  // The gel is the subject, not where its points appear.
+  for (Specimen& specimen : all) specimen.scene.surface.camera_mm = 0;
   return all;
 }
 
@@ -131,6 +133,7 @@ Result measure(const Specimen& specimen, std::uint64_t seed, int presses, int te
   set.reference_q8 = material.reference_q8;
   set.ball_radius_mm = 4;
   set.mm_per_px = table::kMmPerPx;
+  set.view = material.view;
   set.crop = calibration::Crop{table::kCropCol, table::kCropRow, table::kCrop, table::kCrop};
   if (presses == 1) set.presses.push_back({"centre", material.centre, {}});
   for (std::size_t i = 0; i < material.many.size(); ++i) {

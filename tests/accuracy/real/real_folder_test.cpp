@@ -119,7 +119,8 @@ TEST(FolderEvaluation, NamesTheMethodThatItJudges) {
                                .ball_radius_mm = 4,
                                .mm_per_px = 0.005,
                                .lens = {},
-                               .crop = {}};
+                               .crop = {},
+                               .view = {}};
   FolderEvaluation e;
   e.calibration = calibration::build(press);
   e.ball = calibration::evaluate(*e.calibration, press.reference_q8.pixels, press.frames, 4);

@@ -20,13 +20,16 @@ namespace {
 using testing::HasSubstr;
 using testing::ThrowsMessage;
 
-std::string import(const std::string& folder, const std::string& output) {
+std::string import(const std::string& folder, const std::string& output,
+                   const std::vector<std::string>& options = {}) {
   CLI::App app;
   bool json = false;
   add_offline_commands(app, json);
   testing::internal::CaptureStdout();
   try {
-    app.parse(std::vector<std::string>{output, "-o", folder, "import"});
+    std::vector<std::string> words{output, "-o", folder, "import"};  // the last one comes first
+    words.insert(words.begin(), options.rbegin(), options.rend());
+    app.parse(words);
   } catch (...) {
     (void)testing::internal::GetCapturedStdout();
     throw;
@@ -52,9 +55,20 @@ TEST(RealImport, SensorA) {
   const std::string said = import(folder->string(), temp.path() / "cal");
   EXPECT_THAT(said, HasSubstr("63 of 63 pins found"));
   EXPECT_LE(after(said, "this calibration"), 0.012);
-  EXPECT_LE(after(said, "on the rest:"), 0.0095);
+  EXPECT_LE(after(said, "on the rest:"), 0.0115);  // see the test below
   EXPECT_GT(after(said, "published LUT, made from the same press"), 0.008);
   EXPECT_NEAR(calibration::load(temp.path() / "cal").model->mm_per_px, 0.05102, 0.002);
+}
+
+// In true places the contact's inner part agrees better between its sectors, its rim worse: the
+// LUT's straight line to the origin reads the rim too deep, which perspective hid (README.md, "The
+// rim").
+TEST(RealImport, SensorAWithoutPerspective) {
+  const auto folder = sensor_folder("sensor_a");
+  if (!folder) GTEST_SKIP() << "the real images are not beside the repository";
+  const calibration::TempFolder temp;
+  const std::string said = import(folder->string(), temp.path() / "cal", {"--camera-mm", "1000"});
+  EXPECT_LE(after(said, "on the rest:"), 0.0095);
 }
 
 TEST(RealImport, SensorBIsAHardPress) {

@@ -23,6 +23,12 @@ constexpr std::array<Configuration, 6> kConfigurations = {{
 
 }  // namespace
 
+calibration::CameraView view_of(const hal::sim::Scene& scene) {
+  const double mm = scene.surface.camera_mm;
+  if (mm == 0) return {};
+  return {.foot_mm = {}, .source = calibration::HeightSource::drawing, .per_mm = 1 / mm};
+}
+
 std::span<const Configuration> configurations() { return kConfigurations; }
 
 hal::sim::Scene lit(hal::sim::Scene base, const Configuration& configuration) {

@@ -5,6 +5,7 @@
 #include <string_view>
 #include <vector>
 
+#include "daemon/calibration/calibration.hpp"
 #include "hal/light_ring.hpp"
 #include "hal/sim/scene.hpp"
 
@@ -17,6 +18,8 @@ inline constexpr int kCrop = 580;
 inline constexpr int kCropCol = (kFrameWidth - kCrop) / 2;
 inline constexpr int kCropRow = (kFrameHeight - kCrop) / 2;
 inline constexpr double kMmPerPx = 24.0 / kCrop;
+/// The simulated camera's place, as its drawing would say it; unknown where rays are parallel.
+[[nodiscard]] calibration::CameraView view_of(const hal::sim::Scene& scene);
 
 /// The paper's figures for a column of its table "MAE on testing images", millimetres; the
 /// standard deviation of the reference image in grey levels.

@@ -16,6 +16,7 @@ std::shared_ptr<const recon::Model> from_one(const Material& material, recon::Me
   press.frames = material.centre;
   press.ball_radius_mm = material.trial->centre.radius_mm;
   press.mm_per_px = kMmPerPx;
+  press.view = material.view;
   press.crop = calibration::Crop{kCropCol, kCropRow, kCrop, kCrop};
   press.method = method;
   press.may_share_light = true;
@@ -31,6 +32,7 @@ calibration::BallPresses no_presses(const Material& material) {
   set.reference_q8 = material.reference_q8;
   set.ball_radius_mm = material.trial->centre.radius_mm;
   set.mm_per_px = kMmPerPx;
+  set.view = material.view;
   set.crop = calibration::Crop{kCropCol, kCropRow, kCrop, kCrop};
   return set;
 }
@@ -77,6 +79,7 @@ Material gather(Sensor& sensor, const Trial& trial, const RegressionCentre& cent
   Material material;
   material.trial = &trial;
   material.regression_centre = centre;
+  material.view = view_of(sensor.truth().scene());
   material.reference_q8 = sensor.reference(kReferenceFrames);
   material.centre = sensor.press(0, kPressFrames);
   for (std::size_t i = 0; i < trial.many.size(); ++i) {

@@ -17,6 +17,7 @@ namespace dtact::table {
 struct Material {
   const Trial* trial = nullptr;  ///< For the balls' radii.
   RegressionCentre regression_centre;
+  calibration::CameraView view;
   image::Grey16 reference_q8;
   std::vector<image::Grey8> centre;             ///< The press near the centre.
   std::vector<std::vector<image::Grey8>> many;  ///< The presses anywhere.

@@ -46,6 +46,7 @@ class Bench {
     for (std::size_t i = 0; i < kFrames; ++i) press.frames.push_back(sensor.frame(kPressed + i));
     press.ball_radius_mm = 4;
     press.mm_per_px = table::kMmPerPx;
+    press.view = table::view_of(scene_);
     press.crop = calibration::Crop{table::kCropCol, table::kCropRow, table::kCrop, table::kCrop};
     reconstructor_ = std::make_unique<recon::Reconstructor>(calibration::build(press).model);
   }

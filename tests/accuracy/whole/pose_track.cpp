@@ -85,7 +85,7 @@ std::vector<TrackRow> perceive_track(const std::vector<std::string>& frames,
       std::this_thread::sleep_until(due);
     }
     const double began = bench::thread_us();
-    maker.begin(std::move(frame), true);
+    maker.begin(std::move(frame), {.pose = true});
     const auto encoded = maker.make(kind);
     const double took = bench::thread_us() - began;
     v1::Frame sent;

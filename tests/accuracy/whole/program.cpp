@@ -136,7 +136,7 @@ net::FrameKind perceive_kind() {
   wish.set_cloud(v1::CLOUD_INT16);
   wish.set_contact_box(true);
   wish.set_pose(true);
-  perceive::UpstreamSubscription demand(true);
+  perceive::UpstreamSubscription demand(true, 0);
   demand.add(accepted(wish, net::Serves::geometry));
   const net::Subscription daemon = accepted(demand.subscription(), net::Serves::images);
   return daemon.kind(daemon.parts());

@@ -23,34 +23,6 @@ constexpr double kMaxShare = 0.8;
 constexpr double kBeginS = 0.8;  // the reference is taken by then
 constexpr double kAboveMm = 0.1;
 
-/// Draws that are the same with every standard library.
-class Draw {
- public:
-  explicit Draw(std::uint64_t seed) : engine_(seed) {}
-
-  double uniform(double from, double to) {
-    return from + (to - from) * static_cast<double>(engine_() >> 11U) * 0x1p-53;
-  }
-  double log_uniform(double from, double to) {
-    return std::exp(uniform(std::log(from), std::log(to)));
-  }
-  int index(int count) { return std::min(count - 1, static_cast<int>(uniform(0, count))); }
-  int between(int from, int to) { return from + index(to - from + 1); }
-  bool chance(double share) { return uniform(0, 1) < share; }
-
- private:
-  std::mt19937_64 engine_;
-};
-
-/// Similar numbers give seeds that differ much.
-std::uint64_t seed_of(std::uint64_t seed, int number) {
-  std::seed_seq sequence{static_cast<std::uint32_t>(seed), static_cast<std::uint32_t>(seed >> 32U),
-                         static_cast<std::uint32_t>(number)};
-  std::array<std::uint32_t, 2> words{};
-  sequence.generate(words.begin(), words.end());
-  return std::uint64_t{words[0]} << 32U | words[1];
-}
-
 struct NamedObject {
   sim::Object object;
   std::string name;
@@ -336,6 +308,14 @@ std::shared_ptr<const sim::Truth> solve_if_light(const sim::Scene& scene) {
 }
 
 }  // namespace
+
+std::uint64_t seed_of(std::uint64_t seed, int number) {
+  std::seed_seq sequence{static_cast<std::uint32_t>(seed), static_cast<std::uint32_t>(seed >> 32U),
+                         static_cast<std::uint32_t>(number)};
+  std::array<std::uint32_t, 2> words{};
+  sequence.generate(words.begin(), words.end());
+  return std::uint64_t{words[0]} << 32U | words[1];
+}
 
 const char* name_of(LightCase light) noexcept {
   switch (light) {

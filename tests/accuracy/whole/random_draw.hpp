@@ -1,8 +1,11 @@
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <random>
 #include <string>
 #include <vector>
 
@@ -10,6 +13,28 @@
 #include "tests/accuracy/whole/program.hpp"
 
 namespace dtact::whole {
+
+/// Draws that are the same with every standard library.
+class Draw {
+ public:
+  explicit Draw(std::uint64_t seed) : engine_(seed) {}
+
+  double uniform(double from, double to) {
+    return from + (to - from) * static_cast<double>(engine_() >> 11U) * 0x1p-53;
+  }
+  double log_uniform(double from, double to) {
+    return std::exp(uniform(std::log(from), std::log(to)));
+  }
+  int index(int count) { return std::min(count - 1, static_cast<int>(uniform(0, count))); }
+  int between(int from, int to) { return from + index(to - from + 1); }
+  bool chance(double share) { return uniform(0, 1) < share; }
+
+ private:
+  std::mt19937_64 engine_;
+};
+
+/// Similar numbers give seeds that differ much.
+[[nodiscard]] std::uint64_t seed_of(std::uint64_t seed, int number);
 
 /// A simulated sensor with its own gel, optics, light and camera, without presses.
 struct RandomSensor {

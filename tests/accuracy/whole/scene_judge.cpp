@@ -69,6 +69,41 @@ class TruthReader {
     return map;
   }
 
+  /// The contact of the frame last read where it lies, as far as the map shows it.
+  struct TrueContact {
+    double area_mm2 = 0;
+    double x_mm = 0;
+    double y_mm = 0;
+  };
+  [[nodiscard]] TrueContact contact(double map_width_mm, double map_height_mm) const {
+    const hal::sim::Grid& grid = truth_.grid();
+    const double camera_mm = truth_.scene().surface.camera_mm;
+    TrueContact contact;
+    double weight = 0;
+    std::size_t i = 0;
+    for (int row = 0; row < grid.height; ++row) {
+      for (int column = 0; column < grid.width; ++column, ++i) {
+        const double depth = grid_values_[i] / static_cast<double>(hal::sim::Truth::kPerMm);
+        const double x = grid.x0_mm + column * grid.spacing_mm;
+        const double y = grid.y0_mm + row * grid.spacing_mm;
+        const double rest = camera_mm > 0 ? 1 - depth / camera_mm : 1;
+        if (depth <= kContactMm || 2 * std::abs(x) > rest * map_width_mm ||
+            2 * std::abs(y) > rest * map_height_mm) {
+          continue;
+        }
+        contact.area_mm2 += grid.spacing_mm * grid.spacing_mm;
+        weight += depth;
+        contact.x_mm += depth * x;
+        contact.y_mm += depth * y;
+      }
+    }
+    if (weight > 0) {
+      contact.x_mm /= weight;
+      contact.y_mm /= weight;
+    }
+    return contact;
+  }
+
   /// Distance of a point from the true surface of the frame last read, mm, to first order.
   [[nodiscard]] double distance(double x_mm, double y_mm, double depth_mm) const {
     const hal::sim::Grid& grid = truth_.grid();
@@ -153,30 +188,20 @@ void judge_depth(const v1::DepthMap& map, const cv::Mat1s& depth, const TrueMap&
   if (in_contact > 0) out.untrusted = static_cast<double>(untrusted) / in_contact;
 }
 
-void judge_contact(const v1::Frame& frame, const TrueMap& truth, double mm_per_px,
-                   FrameErrors& out) {
+void judge_contact(const v1::Frame& frame, const TrueMap& truth, const TruthReader& reader,
+                   double mm_per_px, FrameErrors& out) {
   const v1::Contact& contact = frame.contact();
-  double weight = 0;
-  double x_sum = 0;
-  double y_sum = 0;
-  for (int y = 0; y < truth.indentation_mm.rows; ++y) {
-    for (int x = 0; x < truth.indentation_mm.cols; ++x) {
-      const auto depth = static_cast<double>(truth.indentation_mm(y, x));
-      out.true_deepest = std::max(out.true_deepest, depth);
-      if (depth <= kContactMm) continue;
-      out.true_area += mm_per_px * mm_per_px;
-      weight += depth;
-      x_sum += depth * x;
-      y_sum += depth * y;
-    }
-  }
+  double deepest = 0;
+  cv::minMaxLoc(truth.indentation_mm, nullptr, &deepest);
+  out.true_deepest = std::max(out.true_deepest, deepest);
+  const TruthReader::TrueContact is =
+      reader.contact(truth.indentation_mm.cols * mm_per_px, truth.indentation_mm.rows * mm_per_px);
+  out.true_area = is.area_mm2;
   out.in_contact = contact.in_contact();
   if (!out.in_contact || !out.pressed) return;
   if (out.true_area < kContactMm2) return;
   out.area = contact.area_mm2() / out.true_area - 1;
-  const double x_mm = (x_sum / weight - 0.5 * (truth.indentation_mm.cols - 1)) * mm_per_px;
-  const double y_mm = (y_sum / weight - 0.5 * (truth.indentation_mm.rows - 1)) * mm_per_px;
-  out.centroid = std::hypot(contact.x_mm() - x_mm, contact.y_mm() - y_mm);
+  out.centroid = std::hypot(contact.x_mm() - is.x_mm, contact.y_mm() - is.y_mm);
   out.deepest = contact.deepest_mm() - out.true_deepest;
   if (contact.has_force_n()) {
     out.force = contact.force_n() - out.true_force;
@@ -295,7 +320,7 @@ SceneReport judge(RandomScene scene, const std::filesystem::path& calibration) {
     if (frame.has_depth()) {
       const cv::Mat1s depth = depth_of(frame.depth());
       judge_depth(frame.depth(), depth, map, errors);
-      judge_contact(frame, map, frame.depth().mm_per_px(), errors);
+      judge_contact(frame, map, reader, frame.depth().mm_per_px(), errors);
       const double ratio = errors.pressed ? errors.inside_ratio() : errors.away / errors.stated;
       if (!errors.is_flagged() && ratio > report.worst_ratio) {
         report.worst_ratio = ratio;
@@ -308,7 +333,7 @@ SceneReport judge(RandomScene scene, const std::filesystem::path& calibration) {
       }
     }
     if (errors.in_contact && errors.pressed) {
-      maker.begin(parsed(program.as(perceive_kind())), false);
+      maker.begin(parsed(program.as(perceive_kind())), {});
       if (const auto made = maker.make(points)) {
         const v1::Frame cloud = parsed(made->body);
         if (cloud.has_cloud()) judge_points(cloud.cloud(), reader, errors);

@@ -71,6 +71,7 @@ BallPress only_press(const BallPresses& set, const recon::FlatFieldGain& gain) {
           .mm_per_px = set.mm_per_px,
           .lens = set.lens,
           .crop = set.crop,
+          .view = set.view,
           .gain = gain,
           .may_share_light = !set.gain_specified,
           .depth_mm = set.presses.front().depth_mm};

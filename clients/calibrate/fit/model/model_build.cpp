@@ -151,7 +151,8 @@ std::string FittedCalibration::describe_press() const {
 FittedCalibration build_model(const BallPresses& set, const recon::FlatFieldGain& gain) {
   check_sizes(set.ball_radius_mm, set.mm_per_px);
   FittedCalibration made;
-  made.calibration = empty_calibration(set.reference_q8, set.crop, set.mm_per_px, set.lens);
+  made.calibration =
+      empty_calibration(set.reference_q8, set.crop, set.mm_per_px, set.lens, set.view);
   auto model = std::make_shared<recon::Model>(*made.calibration.model);
   model->gain = gain_on_map(gain, made.calibration);
   UsablePresses seen = look(*model, set);
