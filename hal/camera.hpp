@@ -2,6 +2,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -25,6 +26,25 @@ struct CameraControl {
   std::string note = {};
 };
 
+/// A number that can be changed while the camera streams, and its range.
+struct CameraSetting {
+  double value = 0;
+  double minimum = 0;
+  double maximum = 0;
+};
+
+/// What the camera has of them.
+struct CameraSettings {
+  std::optional<CameraSetting> exposure_us;  ///< Microseconds.
+  std::optional<CameraSetting> gain;         ///< In the camera's own unit.
+};
+
+/// New values; what is not given stays.
+struct CameraChange {
+  std::optional<double> exposure_us;  ///< Microseconds.
+  std::optional<double> gain;         ///< In the camera's own unit.
+};
+
 /// Who the camera is and how it runs. Size and rate are fixed from construction on; the other
 /// fields are those of the device last attached.
 struct CameraInfo {
@@ -38,6 +58,7 @@ struct CameraInfo {
   /// after it, according to their timestamps (exposure plus the camera's queue).
   int light_delay_frames = 2;
   std::vector<CameraControl> controls;
+  CameraSettings settings;
 };
 
 /// A camera that has sent nothing for longer than this has stalled. Nanoseconds.
@@ -100,6 +121,10 @@ class Camera {
   /// and what lies there is unspecified (a camera may deliver it all the same). It lies in the
   /// image; until the first call it is the whole. Called between two grabs, by their thread.
   virtual void will_read(const Area& /*area*/) noexcept {}
+  /// Changes settings that info() has, within their ranges, until the object ends; also of a camera
+  /// that is plugged in again. May take a second. Any thread but the one that calls grab(). Throws
+  /// std::runtime_error when the camera refuses.
+  virtual void change(const CameraChange& /*change*/) {}
   /// Waits at most `timeout` for the newest complete frame. Does not allocate in steady state. The
   /// caller holds at most one frame: assigning `out` gives the one before back.
   [[nodiscard]] virtual GrabStatus grab(Frame& out, std::chrono::nanoseconds timeout) noexcept = 0;

@@ -45,7 +45,7 @@ int interface_of(const ip::address& address) {
 
 std::vector<std::string> txt_of(const Facts& facts) {
   std::vector<std::string> txt = {"version=" + facts.version, "serial=" + facts.serial,
-                                  facts.tls ? "tls=1" : "tls=0",
+                                  "instance=" + facts.instance, facts.tls ? "tls=1" : "tls=0",
                                   facts.token ? "token=1" : "token=0"};
   for (auto& one : txt) one.resize(std::min(one.size(), kMaxTxt));
   return txt;

@@ -18,8 +18,9 @@ struct Service {
 
 /// What a client wants to know before it connects.
 struct Facts {
-  std::string version;  ///< "0.1.0"
-  std::string serial;   ///< The camera's, or empty.
+  std::string version;   ///< "0.1.0"
+  std::string serial;    ///< The camera's, or empty.
+  std::string instance;  ///< HelloReply.instance.
   bool tls = false;
   bool token = false;  ///< Asks for one.
 };

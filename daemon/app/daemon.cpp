@@ -5,14 +5,19 @@
 #include <malloc.h>
 #include <spdlog/spdlog.h>
 
+#include <array>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/signal_set.hpp>
+#include <chrono>
 #include <csignal>
+#include <cstddef>
 #include <filesystem>
 #include <functional>
 #include <memory>
 #include <optional>
+#include <random>
 #include <stdexcept>
+#include <string_view>
 #include <system_error>
 #include <utility>
 
@@ -26,7 +31,6 @@
 #include "daemon/app/watchdog.hpp"
 #include "daemon/calibration/calibration.hpp"
 #include "daemon/metrics/endpoint.hpp"
-#include "daemon/metrics/machine.hpp"
 #include "daemon/metrics/text.hpp"
 #include "daemon/net/calibration_store.hpp"
 #include "daemon/net/light_schemes.hpp"
@@ -35,6 +39,7 @@
 #include "daemon/serve/security.hpp"
 #include "hal/base/clock.hpp"
 #include "hal/base/cpu_claim.hpp"
+#include "hal/base/machine.hpp"
 #include "hal/base/rt_thread.hpp"
 #include "hal/base/unique_fd.hpp"
 #include "hal/registry.hpp"
@@ -63,8 +68,8 @@ fs::path make_state_folder(const Config& config) {
 /// Says that the current calibration is not used, which it names, and what to do.
 std::string passed_over(const net::FolderCalibrationStore& store, bool configured) {
   const fs::path folder = store.current();
-  const std::string number =
-      store.current_number() ? std::to_string(*store.current_number()) : folder.string();
+  const auto current = store.current_number();
+  const std::string number = current ? std::to_string(*current) : folder.string();
   return fmt::format(
       "Calibration {0} ({1}) is not used: {2} starts with it ended early. The daemon runs with "
       "{3}. "
@@ -128,8 +133,9 @@ net::NetConfig make_net_config(const Config& config) {
   if (net.name.empty()) net.name = default_name();
   resolve_credentials(net);
   net.log = [](const net::LogLine& line) {
-    log_line(line.level == net::LogLevel::info ? spdlog::level::info : spdlog::level::warn,
-             line.text, {{"DTACT_CLIENT", line.client}, {"DTACT_TOKEN", line.token}});
+    constexpr std::array kLevels{spdlog::level::debug, spdlog::level::info, spdlog::level::warn};
+    log_line(kLevels.at(static_cast<std::size_t>(line.level)), line.text,
+             {{"DTACT_CLIENT", line.client}, {"DTACT_TOKEN", line.token}});
   };
   return net;
 }
@@ -154,22 +160,26 @@ std::optional<metrics::Endpoint> serve_metrics(asio::io_context& io,
   if (config.port == 0) return std::nullopt;
   spdlog::info("metrics on http://{}:{}/metrics", config.address, config.port);
   return std::optional<metrics::Endpoint>(std::in_place, io, config, [&server] {
-    return metrics::text(server.overview(), metrics::temperatures(), metrics::heap(),
-                         base::system_clock().monotonic_ns());
+    return metrics::text(server.overview(), base::heap(), base::system_clock().monotonic_ns());
   });
 }
 
 /// Nothing where only this machine can connect.
 std::optional<announce::Announcer> announce_service(asio::io_context& io, const Config& config,
+                                                    const std::string& instance,
                                                     const net::Server& server) {
   if (!config.announce || !announce::is_reachable(config.net.address)) return std::nullopt;
-  const auto ask = [&address = config.net.address, &server] {
+  const auto ask = [&address = config.net.address, instance, &server] {
     const v1::Status status = server.overview().status;
     const v1::Endpoint& tcp = *status.endpoints().rbegin();  // a socket file comes before it
     announce::Service service;
     service.name = status.name();
     service.port = server.port();
-    service.txt = announce::txt_of({DTACT_VERSION, status.serial(), tcp.tls(), tcp.token()});
+    service.txt = announce::txt_of({.version = DTACT_VERSION,
+                                    .serial = status.serial(),
+                                    .instance = instance,
+                                    .tls = tcp.tls(),
+                                    .token = tcp.token()});
     announce::restrict_to(address, service);
     return service;
   };
@@ -198,6 +208,13 @@ std::string reload(Config& running, const std::function<Config()>& load, net::Se
 }  // namespace
 
 void run_daemon(const Config& config, const std::function<Config()>& load) {
+  const auto began = std::chrono::steady_clock::now();
+  const auto log_step = [began](std::string_view step) {
+    spdlog::debug("start: {} after {} ms", step,
+                  std::chrono::duration_cast<std::chrono::milliseconds>(
+                      std::chrono::steady_clock::now() - began)
+                      .count());
+  };
   keep_little_memory();
   base::demote_at_rttime_limit();
   asio::io_context io(1);
@@ -206,6 +223,9 @@ void run_daemon(const Config& config, const std::function<Config()>& load) {
   asio::signal_set hangups(io, SIGHUP);
 
   net::NetConfig net = make_net_config(config);
+  std::random_device random;
+  const std::string instance = fmt::format("{:08x}{:08x}", random(), random());
+  net.instance = instance;
   name_sensor(net.name);
   const fs::path state = make_state_folder(config);
   const base::UniqueFd owned = own_state_folder(state, net.name);
@@ -213,6 +233,7 @@ void run_daemon(const Config& config, const std::function<Config()>& load) {
 
   check_camera_files(config.hal.camera);
   hal::Devices devices = hal::open_devices(config.hal);
+  log_step("camera and ring are open");
   const hal::RingReport ring = devices.ring->attend(config.pipeline.light);
   if (ring.away) spdlog::warn("no LED ring yet, it is looked for: {}", ring.message);
   if (!ring.note.empty()) spdlog::warn("ring: {}", ring.note);
@@ -235,8 +256,10 @@ void run_daemon(const Config& config, const std::function<Config()>& load) {
     spdlog::warn("{}", settings.calibration_note);
   }
   auto calibration = load_calibration(folder, config, settings.calibration_note);
+  log_step("the calibration is read");
   const bool uncalibrated = calibration == nullptr;
   const auto made = make_pipeline(std::move(devices), calibration, settings, store);
+  log_step("its tables are made");
   pipeline::Pipeline& pipeline = *made;
   calibration.reset();  // its megabytes go when another one comes into use
   if (net.fifo_priority > 0) {
@@ -244,9 +267,10 @@ void run_daemon(const Config& config, const std::function<Config()>& load) {
     if (!net.realtime_refused.empty()) spdlog::warn("{}", net.realtime_refused);
   }
   net::Server server(io, std::move(net), pipeline, store);
-  auto announced = announce_service(io, config, server);
+  auto announced = announce_service(io, config, instance, server);
   auto metrics = serve_metrics(io, config.metrics, server);
   pipeline.start();
+  log_step("the camera is started");
   for (const std::string& refused : pipeline.status().realtime) spdlog::warn("{}", refused);
 
   pipeline::HealthSet reported;

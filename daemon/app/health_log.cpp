@@ -11,16 +11,6 @@ namespace {
 
 using pipeline::Health;
 
-/// The fix for this health flag alone.
-std::string fix(const pipeline::Status& status, Health health) {
-  pipeline::Status only = status;
-  only.state = pipeline::State::serving;
-  only.health = {};
-  only.health.set(health);
-  only.storage_message.clear();
-  return net::advice(only);
-}
-
 /// Part of every start and of every change of the light.
 bool is_usual(Health health) {
   return health == Health::starting || health == Health::light_unsettled;
@@ -63,7 +53,7 @@ std::vector<HealthLog::Line> HealthLog::step(const pipeline::Status& status, Tim
                                                 times, times == 1 ? "" : "s")
                                   : "";
     lines.push_back(
-        {!is_usual(health), name, fmt::format("{}: {}{}", name, fix(status, health), often)});
+        {!is_usual(health), name, fmt::format("{}: {}{}", name, net::fix(status, health), often)});
   }
   return lines;
 }

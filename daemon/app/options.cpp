@@ -45,6 +45,9 @@ void set_up(CLI::App& cli, Options& options) {
       "Log: one line for each command that changes something, with the client's address and\n"
       "program, the name of its token, the values and the result. In the journal DTACT_CLIENT and\n"
       "DTACT_TOKEN find them: journalctl -u dtactd DTACT_TOKEN=NAME.\n"
+      "Limits: no client ends the daemon, fills its memory or locks others out. proto/README.md "
+      "has\n"
+      "the limits of clients, requests, messages and files, dtactd.toml(5) those that may be set.\n"
       "Exit status: 0 after SIGTERM or SIGINT, 1 on an error, 2 on a wrong command line.");
 }
 

@@ -1,7 +1,12 @@
 #include "daemon/app/throttle_timer.hpp"
 
+#include <spdlog/spdlog.h>
+
 #include <boost/asio/io_context.hpp>
 #include <chrono>
+#include <utility>
+
+#include "hal/base/rt_thread.hpp"
 
 namespace dtact::app {
 namespace {
@@ -26,6 +31,9 @@ void ThrottleTimer::wait() {
   timer_.async_wait([this](const boost::system::error_code& error) {
     if (error || stopped_) return;
     throttle_.pause_if_busy();
+    if (base::was_demoted() && !std::exchange(reported_, true)) {
+      spdlog::warn("{}", base::demoted_sentence("network"));
+    }
     wait();
   });
 }

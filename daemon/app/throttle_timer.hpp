@@ -11,7 +11,8 @@ class io_context;
 namespace dtact::app {
 
 /// Calls base::RealtimeThrottle on the network thread ten times a second, for when the thread has
-/// more clients than it can serve. On the thread that runs `io`.
+/// more clients than it can serve. Logs it when the thread has lost its priority all the same. On
+/// the thread that runs `io`.
 class ThrottleTimer {
  public:
   explicit ThrottleTimer(boost::asio::io_context& io);
@@ -23,6 +24,7 @@ class ThrottleTimer {
 
   boost::asio::steady_timer timer_;
   base::RealtimeThrottle throttle_;
+  bool reported_ = false;
   bool stopped_ = false;
 };
 

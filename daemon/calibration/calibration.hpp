@@ -36,6 +36,37 @@ struct GelEstimate {
   bool operator==(const GelEstimate&) const = default;
 };
 
+/// How a camera's height above the surface is known.
+enum class HeightSource : std::uint8_t {
+  unknown,  ///< Depth is placed as it is seen.
+  assumed,  ///< The height that real sensors of this family have, kAssumedPerMm.
+  board,    ///< A board of pins.
+  drawing,  ///< The maker's drawing.
+  presses   ///< Presses of a ball at several places.
+};
+
+/// Where the camera stands above the surface, and how well that is known.
+struct CameraView {
+  /// Foot of the camera's axis on the surface: millimetres of the lens, from the map's centre
+  /// where there is no lens, and in a Calibration always.
+  recon::Point foot_mm;
+  HeightSource source = HeightSource::unknown;
+  double per_mm = 0;  ///< 1 / height above the surface; 0: not known yet.
+  /// A board shows 1 / height in grey levels: the share of a point's distance from the foot by
+  /// which it is seen farther out, for each grey level of darkening. A LUT makes millimetres of it.
+  double per_level = 0;
+  double error = 0;  ///< Standard error of per_mm, or of per_level where only that is known.
+
+  [[nodiscard]] bool operator==(const CameraView&) const = default;
+};
+
+/// 1 / height of real sensors: eight boards give 0.029 to 0.054, and one height of 20 to 30 mm
+/// improves seven of eight sensors.
+inline constexpr double kAssumedPerMm = 1.0 / 30;
+/// Heights that are believed, 1/mm.
+inline constexpr double kMinPerMm = 0.015;
+inline constexpr double kMaxPerMm = 0.08;
+
 /// One photometric control at calibration time (the shape of hal::CameraControl, without the HAL).
 struct Control {
   std::string name;
@@ -50,6 +81,7 @@ struct Origin {
   std::vector<Control> controls;
   std::vector<std::uint8_t> leds;  ///< r, g, b that each LED emits; empty = not recorded.
   std::string created;             ///< ISO 8601, UTC.
+  std::string scale_from;          ///< How mm_per_px was found; empty = not recorded.
   struct Source {
     std::string name;    ///< File name, without folder.
     std::string sha256;  ///< Hex.
@@ -66,6 +98,7 @@ struct Calibration {
   int crop_col = 0;
   int crop_row = 0;
   std::optional<recon::Lens> lens;  ///< None: the depth map is a part of the frame as it is.
+  CameraView view;                  ///< What model->surface.view was made from.
   std::optional<GelEstimate> gel;   ///< Where a gel was fitted to the presses.
   Origin origin;
 };

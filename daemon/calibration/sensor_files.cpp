@@ -114,7 +114,7 @@ std::string format(const LensFile& file) {
   for (const std::string& note : file.notes) t += fmt::format("# {}\n", note);
   t += fmt::format("version = {}\n\n[frame]\nwidth = {}\nheight = {}\n\n[lens]\n", kFormatVersion,
                    file.frame_width, file.frame_height);
-  t += format_lens(file.lens) + "\n";
+  t += format_lens(file.lens) + "\n" + format_view(file.view);
   return file.gain_specified ? t + format_gain(file.gain) : t;
 }
 
@@ -125,12 +125,16 @@ LensFile load_lens(const std::filesystem::path& path) {
       throw std::runtime_error(
           path.string() + ": this calibration has no lens; make one with dtact-calibrate lens");
     }
-    return {calibration.model->rectify.frame_width,
-            calibration.model->rectify.frame_height,
-            *calibration.lens,
-            {},
-            {},
-            false};
+    const recon::RectifyTable& map = calibration.model->rectify;
+    const recon::Point centre = surface_point(*calibration.lens,
+                                              {calibration.crop_col, calibration.crop_row,
+                                               map.width, map.height, calibration.model->mm_per_px},
+                                              0.5 * (map.width - 1), 0.5 * (map.height - 1));
+    LensFile file{map.frame_width, map.frame_height, *calibration.lens, {}, {},
+                  false,           calibration.view};
+    file.view.foot_mm.x += centre.x;
+    file.view.foot_mm.y += centre.y;
+    return file;
   }
   const toml::table document = tomlfile::parse(base::read_file(path), path.string());
   tomlfile::KeyReader top(document, path.string());
@@ -144,6 +148,7 @@ LensFile load_lens(const std::filesystem::path& path) {
       read_lens(top.table("lens"), file.frame_width, file.frame_height);
   file.gain_specified = top.has("gain");
   if (file.gain_specified) file.gain = read_gain(top.table("gain"));
+  if (top.has("viewpoint")) file.view = read_view(top.table("viewpoint"));
   top.finish();
   if (!lens) top.fail("lens", "is empty; make a lens with dtact-calibrate lens");
   file.lens = *lens;

@@ -37,6 +37,7 @@ struct LensFile {
   recon::FlatFieldGain gain;       ///< Places in millimetres of the lens's surface.
   std::vector<std::string> notes;  ///< Comment lines: how it was measured and how well it fits.
   bool gain_specified = false;     ///< A board said so, also where `gain` is none.
+  CameraView view;
 };
 
 /// The keys of a `[lens]` table, one a line, without the header. Numbers are read back exactly.

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <string>
@@ -54,6 +55,10 @@ std::vector<double> read_five(KeyReader& reader, const char* key, double least) 
 
 using Kind = recon::Surface::Kind;
 using Limits = recon::SurfaceLimits;
+
+/// As HeightSource numbers them.
+constexpr std::array<std::string_view, 5> kHeightSources = {"unknown", "assumed", "board",
+                                                            "drawing", "presses"};
 
 std::string format_shape(const recon::Surface& surface) {
   if (surface.kind == Kind::sphere) {
@@ -166,6 +171,46 @@ GelEstimate read_gel(KeyReader reader) {
   gel.residual_levels = reader.number("residual_levels", 0, kMax);
   reader.finish();
   return gel;
+}
+
+std::string format_view(const CameraView& view) {
+  if (view.source == HeightSource::unknown) return {};
+  const bool levels = view.per_mm == 0;
+  return fmt::format(
+      "[viewpoint]  # of the camera: a point pressed in by d is at x - (x - foot) * d * per_mm\n"
+      "foot = [{}, {}]  # of the camera's axis on the surface, mm\n"
+      "source = \"{}\"\n"
+      "{} = {}  # {}\n"
+      "error = {}  # standard error of it; 0: not known\n\n",
+      view.foot_mm.x, view.foot_mm.y, kHeightSources[static_cast<std::size_t>(view.source)],
+      levels ? "per_level" : "per_mm", levels ? view.per_level : view.per_mm,
+      levels ? "1 / height, for each grey level that a LUT turns into millimetres"
+             : "1 / height above the surface",
+      view.error);
+}
+
+CameraView read_view(KeyReader reader) {
+  CameraView view;
+  if (reader.keys().empty()) return view;
+  const std::vector<double> foot = reader.numbers("foot", -Limits::kMaxFootMm, Limits::kMaxFootMm);
+  if (foot.size() != 2) reader.fail("foot", "expected x and y");
+  view.foot_mm = {foot[0], foot[1]};
+  const std::string source = reader.text("source");
+  const auto known = std::ranges::find(kHeightSources, source);
+  if (known == kHeightSources.end() || known == kHeightSources.begin()) {
+    reader.fail("source", "\"" + source +
+                              "\" is not allowed; expected \"assumed\", \"board\", \"drawing\" or "
+                              "\"presses\"");
+  }
+  view.source = static_cast<HeightSource>(known - kHeightSources.begin());
+  if (reader.has("per_level")) {
+    view.per_level = reader.number("per_level", 0, Limits::kMaxPerMm);
+  } else {
+    view.per_mm = reader.number("per_mm", 0, Limits::kMaxPerMm);
+  }
+  view.error = reader.number("error", 0, 1);
+  reader.finish();
+  return view;
 }
 
 std::string format_surface(const recon::Surface& surface) {

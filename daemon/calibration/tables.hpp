@@ -44,6 +44,12 @@ std::string array_text(const std::vector<Value>& values) {
 /// Throws as KeyReader.
 [[nodiscard]] GelEstimate read_gel(tomlfile::KeyReader reader);
 
+/// A `[viewpoint]` table of a calibration or a lens file, with its header; empty where the height
+/// is unknown.
+[[nodiscard]] std::string format_view(const CameraView& view);
+/// Takes its keys. Throws as KeyReader.
+[[nodiscard]] CameraView read_view(tomlfile::KeyReader reader);
+
 /// A `[surface]` table of a calibration; empty for a plane.
 [[nodiscard]] std::string format_surface(const recon::Surface& surface);
 

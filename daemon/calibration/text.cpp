@@ -129,9 +129,11 @@ Files format(const Calibration& calibration) {
       "method = {}\n"
       "created = {}  # UTC\n"
       "mm_per_px = {}  # of the depth map\n"
+      "scale_from = {}\n"
       "smoothing_px = {}  # standard deviation of the Gaussian on the difference\n\n",
       kFormatVersion, tomlfile::quoted(model.method == recon::Method::lut ? "lut" : "published"),
-      tomlfile::quoted(calibration.origin.created), model.mm_per_px, model.smoothing_px);
+      tomlfile::quoted(calibration.origin.created), model.mm_per_px,
+      tomlfile::quoted(calibration.origin.scale_from), model.smoothing_px);
   t += fmt::format("[frame]\nwidth = {}\nheight = {}\n\n", map.frame_width, map.frame_height);
   t += fmt::format(
       "[crop]  # the depth map in the frame, or in the image that the lens rectifies\ncol = "
@@ -155,6 +157,7 @@ Files format(const Calibration& calibration) {
   t += fmt::format(
       "[lens]  # where the surface appears in the frame; empty: the frame as it is\n{}\n",
       calibration.lens ? format_lens(*calibration.lens) : "");
+  t += format_view(calibration.view);
   t += fmt::format("[surface]  # of the undeformed gel; empty: a plane\n{}\n",
                    format_surface(model.surface));
   t += format_gain(model.gain);
@@ -182,6 +185,7 @@ Calibration parse(const std::string& toml, const std::string& reference_png,
     top.fail("created", "expected a time as \"2026-01-31T12:00:00Z\"");
   }
   model->mm_per_px = top.number("mm_per_px", 0.0001, 10);
+  if (top.has("scale_from")) calibration.origin.scale_from = top.text("scale_from");
   model->smoothing_px = top.number("smoothing_px", 0, 10);
 
   tomlfile::KeyReader frame = top.table("frame");
@@ -226,6 +230,17 @@ Calibration parse(const std::string& toml, const std::string& reference_png,
   if (top.has("force")) model->force = read_force(top.table("force"));
   add_untrusted(*model, outside);
   if (top.has("surface")) model->surface = read_surface(top.table("surface"));
+  if (top.has("viewpoint")) {
+    const tomlfile::KeyReader view = top.table("viewpoint");
+    calibration.view = read_view(view);
+    if (calibration.view.per_mm == 0) {
+      view.fail("per_mm", "must be above 0; without the table the height is unknown");
+    }
+    // Behind a curved surface [surface] says where the camera stands.
+    if (model->surface.kind == recon::Surface::Kind::plane) {
+      model->surface.view = {calibration.view.foot_mm, calibration.view.per_mm};
+    }
+  }
   read_reference(top.table("reference"), reference_png, where, *model);
   top.finish();
   calibration.model = std::move(model);

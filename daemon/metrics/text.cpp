@@ -174,8 +174,8 @@ void add_clients(Families& to, const net::Overview& overview) {
              traffic.bytes);
 }
 
-void add_machine(Families& to, const v1::Status& status,
-                 const std::vector<Temperature>& temperatures, const Heap& heap) {
+void add_machine(Families& to, const net::Overview& overview, const base::Heap& heap) {
+  const v1::Status& status = overview.status;
   const v1::ThreadUsage& usage = status.capture_thread();
   to.begin("dtactd_capture_thread_page_faults_total",
            "The capture thread's page faults: major ones read a disk.", MetricType::Counter);
@@ -196,24 +196,23 @@ void add_machine(Families& to, const v1::Status& status,
   to.add(static_cast<double>(heap.used - heap.mapped), {{"kind", "used"}});
   to.add(static_cast<double>(heap.mapped), {{"kind", "mapped"}});
   to.add(static_cast<double>(heap.free), {{"kind", "kept"}});
-  if (temperatures.empty()) return;
+  if (overview.temperatures.empty()) return;
   to.begin("dtactd_board_temperature_celsius", "The board's own thermal zones.", MetricType::Gauge);
-  for (const auto& one : temperatures) {
+  for (const auto& one : overview.temperatures) {
     to.add(one.celsius, {{"zone", one.zone}, {"type", one.type}});
   }
 }
 
 }  // namespace
 
-std::string text(const net::Overview& overview, const std::vector<Temperature>& temperatures,
-                 const Heap& heap, std::int64_t now_ns) {
+std::string text(const net::Overview& overview, const base::Heap& heap, std::int64_t now_ns) {
   Families families;
   add_state(families, overview.status);
   add_frames(families, overview);
   add_camera(families, overview.status.camera());
   add_light(families, overview, now_ns);
   add_clients(families, overview);
-  add_machine(families, overview.status, temperatures, heap);
+  add_machine(families, overview, heap);
   return families.text();
 }
 

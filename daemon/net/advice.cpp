@@ -30,8 +30,8 @@ constexpr std::array<Fix, pipeline::kHealthCount> kFixes = {{
      "ball "
      "of known radius. From images: dtact-calibrate depth, then dtactctl calibration upload."},
     {Health::camera_mismatch,
-     "Camera, mode or controls differ from the calibration's: restore them in the configuration "
-     "or calibrate again."},
+     "Camera, mode or controls differ from the calibration's: restore them (dtactctl camera, the "
+     "configuration) or calibrate again."},
     {Health::camera_shifted,
      "The gel's marks are not where they were at calibration: camera or gel has moved, and "
      "depth "
@@ -46,8 +46,8 @@ constexpr std::array<Fix, pipeline::kHealthCount> kFixes = {{
      "The reference belongs to another light: keep the surface free for a second or run "
      "dtactctl rezero."},
     {Health::reference_restored,
-     "There was contact at start, so the last good reference is used: free the surface and run "
-     "dtactctl rezero."},
+     "The last good reference is used after a start until a new one is taken: keep the surface "
+     "free for a second or run dtactctl rezero."},
     {Health::beyond_calibration,
      "Pressed deeper than was calibrated: these pixels are marked untrusted; press less or "
      "calibrate with a deeper press."},
@@ -147,17 +147,23 @@ std::string state_name(State state) {
   return short_name(v1::State_Name(static_cast<v1::State>(static_cast<int>(state) + 1)));
 }
 
+std::string fix(const pipeline::Status& status, Health health) {
+  if (waits_for_light(status.health, health))
+    return "It waits for a picture that is bright enough.";
+  std::string text(std::ranges::find(kFixes, health, &Fix::health)->sentence);
+  add(text, detail(status, health));
+  return text;
+}
+
 std::string advice(const pipeline::Status& status) {
   std::string text;
   if (status.state == State::camera_lost && !status.health.has(Health::camera_fault)) {
     add(text, "The camera is away.");
     add(text, status.camera_report.fix);
   }
-  for (const auto& fix : kFixes) {
-    if (!status.health.has(fix.health)) continue;
-    if (waits_for_light(status.health, fix.health)) continue;
-    add(text, fix.sentence);
-    add(text, detail(status, fix.health));
+  for (const auto& [health, _] : kFixes) {
+    if (!status.health.has(health) || waits_for_light(status.health, health)) continue;
+    add(text, fix(status, health));
   }
   add(text, status.storage_message);
   return text;

@@ -8,8 +8,8 @@
 #include <algorithm>
 #include <cerrno>
 #include <charconv>
-#include <fstream>
 #include <ranges>
+#include <sstream>
 #include <string_view>
 #include <system_error>
 #include <utility>
@@ -74,6 +74,15 @@ std::string time_of(const fs::path& folder) {
   return fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(about.st_mtim.tv_sec));
 }
 
+/// A small file; empty where there is none that can be read.
+std::string text_of(const fs::path& file) {
+  try {
+    return base::read_file(file, 65536);
+  } catch (const std::system_error&) {
+    return {};
+  }
+}
+
 /// The folder's name, also for "cal/".
 std::string name_of(const fs::path& folder) {
   return fs::weakly_canonical(folder).filename().string();
@@ -132,7 +141,7 @@ bool FolderCalibrationStore::begin_start() {
   const std::string target = fs::read_symlink(state_ / kLink, error).string();
   if (error || target.empty()) return true;
   int begun = 0;  // before this one, with the same calibration
-  std::ifstream file(state_ / kStarts);
+  std::istringstream file(text_of(state_ / kStarts));
   std::string of;
   if (!(std::getline(file, of) && of == target && file >> begun)) begun = 0;
   passed_over_ = begun >= kMaxFailedStarts;
@@ -205,7 +214,7 @@ std::vector<std::uint64_t> FolderCalibrationStore::by_use() const {
   const auto add = [&](std::uint64_t number) {
     if (std::ranges::find(numbers, number) == numbers.end()) numbers.push_back(number);
   };
-  std::ifstream noted(state_ / kFolders / kRecent);
+  std::istringstream noted(text_of(state_ / kFolders / kRecent));
   for (std::uint64_t number = 0; noted >> number;) {
     if (std::ranges::binary_search(uploaded, number)) add(number);
   }

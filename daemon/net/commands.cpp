@@ -2,6 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <boost/asio/post.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <mutex>
 #include <utility>
 
 #include "daemon/net/hub.hpp"
@@ -9,6 +13,9 @@
 #include "daemon/net/messages.hpp"
 #include "daemon/serve/client_status.hpp"
 #include "hal/base/clock.hpp"
+#include "hal/base/rt_thread.hpp"
+#include "hal/base/utf8.hpp"
+#include "proto/defaults.hpp"
 #include "proto/dtact.pb.h"
 
 namespace dtact::net {
@@ -27,7 +34,8 @@ std::string change(const v1::SetLight& request, hal::Light& light) {
   if (request.has_scheme()) {
     const auto leds = scheme_leds(request.scheme());
     if (!leds.has_value()) {
-      return fmt::format("set_light.scheme: \"{}\" is unknown; known are {}", request.scheme(),
+      return fmt::format("set_light.scheme: \"{}\" is unknown; known are {}",
+                         base::first_bytes(request.scheme(), wire::kMaxCalibrationName),
                          scheme_names());
     }
     light.leds = *leds;
@@ -50,14 +58,63 @@ std::string change(const v1::SetLight& request, hal::Light& light) {
   return {};
 }
 
+/// What is wrong with a value for `name`; empty when nothing is.
+std::string refusal_of(const char* name, double value,
+                       const std::optional<hal::CameraSetting>& setting) {
+  if (!setting) return fmt::format("set_camera.{}: this camera has no such control", name);
+  if (value >= setting->minimum && value <= setting->maximum) return {};
+  return fmt::format("set_camera.{}: {:g}; this camera has {:g} to {:g}", name, value,
+                     setting->minimum, setting->maximum);
+}
+
 }  // namespace
+
+/// The board's temperatures, read every two seconds on the worker: a firmware may be slow to say
+/// them.
+class Commands::Thermometer : public std::enable_shared_from_this<Thermometer> {
+ public:
+  Thermometer(asio::thread_pool& worker, std::filesystem::path folder)
+      : folder_(std::move(folder)), timer_(worker) {}
+
+  void start() {
+    asio::post(timer_.get_executor(), [weak = weak_from_this()] { measure(weak); });
+  }
+
+  [[nodiscard]] std::vector<base::Temperature> latest() const {
+    const std::lock_guard lock(mutex_);
+    return latest_;
+  }
+
+ private:
+  static void measure(const std::weak_ptr<Thermometer>& weak) {
+    const auto self = weak.lock();
+    if (self == nullptr) return;
+    auto fresh = base::temperatures(self->folder_);
+    {
+      const std::lock_guard lock(self->mutex_);
+      self->latest_ = std::move(fresh);
+    }
+    self->timer_.expires_after(std::chrono::seconds(2));
+    self->timer_.async_wait([weak](const boost::system::error_code& error) {
+      if (!error) measure(weak);
+    });
+  }
+
+  std::filesystem::path folder_;
+  asio::steady_timer timer_;  ///< Of the worker.
+  mutable std::mutex mutex_;
+  std::vector<base::Temperature> latest_;  ///< Under the mutex.
+};
 
 Commands::Commands(asio::io_context& io, asio::thread_pool& worker, const NetConfig& config,
                    Hub& hub, pipeline::Port& port, CalibrationStore& store)
     : config_(config),
       hub_(hub),
       port_(port),
-      calibrations_(std::make_shared<CalibrationCommands>(io, worker, config, hub, port, store)) {}
+      calibrations_(std::make_shared<CalibrationCommands>(io, worker, config, hub, port, store)),
+      thermometer_(std::make_shared<Thermometer>(worker, config.thermal_folder)) {
+  thermometer_->start();
+}
 
 void Commands::on_request(const std::shared_ptr<Session>& session,
                           const v1::ClientMessage& message) {
@@ -67,6 +124,8 @@ void Commands::on_request(const std::shared_ptr<Session>& session,
       return subscribe(requester, message.subscribe());
     case v1::ClientMessage::kSetLight:
       return set_light(requester, message.set_light());
+    case v1::ClientMessage::kSetCamera:
+      return set_camera(requester, message.set_camera());
     case v1::ClientMessage::kRezero:
       return rezero(requester, message.rezero().force());
     case v1::ClientMessage::kGetStatus:
@@ -122,6 +181,30 @@ void Commands::set_light(const Requester& requester, const v1::SetLight& request
                });
 }
 
+void Commands::set_camera(const Requester& requester, const v1::SetCamera& request) {
+  const hal::CameraSettings has = port_.status().camera.settings;
+  pipeline::SetCamera command;
+  std::string wrong;
+  if (request.has_exposure_us()) {
+    command.change.exposure_us = request.exposure_us();
+    wrong = refusal_of("exposure_us", request.exposure_us(), has.exposure_us);
+  }
+  if (request.has_gain()) {
+    command.change.gain = request.gain();
+    if (wrong.empty()) wrong = refusal_of("gain", request.gain(), has.gain);
+  }
+  if (!wrong.empty()) return requester.refuse(v1::ERROR_INVALID, wrong);
+  if (!command.change.exposure_us && !command.change.gain) {
+    return requester.reply([&](v1::Reply& out) { fill(has, *out.mutable_camera()); });
+  }
+  (void)submit(port_, requester, command,
+               [requester, &port = port_](const pipeline::CommandDone& done) {
+                 requester.reply(done, [&](v1::Reply& out) {
+                   fill(port.status().camera.settings, *out.mutable_camera());
+                 });
+               });
+}
+
 void Commands::rezero(const Requester& requester, bool force) {
   (void)submit(port_, requester, pipeline::Rezero{force},
                [requester](const pipeline::CommandDone& done) {
@@ -141,7 +224,13 @@ Overview Commands::overview() const {
   overview.stages = std::move(pipeline.stages);
   overview.traffic = hub_.traffic();
   overview.reference_taken_ns = hub_.reference_taken_ns();
+  overview.temperatures = thermometer_->latest();
+  if (!overview.temperatures.empty()) {
+    status.set_board_celsius(
+        std::ranges::max_element(overview.temperatures, {}, &base::Temperature::celsius)->celsius);
+  }
   if (!config_.realtime_refused.empty()) status.add_realtime_refused(config_.realtime_refused);
+  if (base::was_demoted()) status.add_realtime_refused(base::demoted_sentence("network"));
   for (auto& stage : hub_.stages()) {
     fill(stage, *status.add_stages());
     overview.stages.push_back(std::move(stage));

@@ -12,6 +12,7 @@
 #include "daemon/serve/session.hpp"
 
 namespace dtact::v1 {
+class SetCamera;
 class SetLight;
 class Subscribe;
 }  // namespace dtact::v1
@@ -34,14 +35,18 @@ class Commands {
   void subscribe(const Requester& requester, const v1::Subscribe& request);
   /// The last writer wins. A partial update changes the light that was requested last.
   void set_light(const Requester& requester, const v1::SetLight& request);
+  void set_camera(const Requester& requester, const v1::SetCamera& request);
   void rezero(const Requester& requester, bool force);
   void get_status(const Requester& requester);
   void ping(const Requester& requester);
+
+  class Thermometer;
 
   const NetConfig& config_;
   Hub& hub_;
   pipeline::Port& port_;
   std::shared_ptr<CalibrationCommands> calibrations_;
+  std::shared_ptr<Thermometer> thermometer_;
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
 };
 

@@ -110,7 +110,11 @@ bool FrameEncoder::Impl::write(const FrameKind& kind, std::string& body) {
   if (luma) size += frame->luma.size();
   if (jpeg) size += frame->jpeg.size();
   if (size > kMaxBody) return false;
-  message.SerializeToString(&body);
+  // All of it at once: a string that grows piece by piece takes up to twice the memory.
+  constexpr std::size_t kHeadsAndTimes = 256;
+  body.clear();
+  body.reserve(size + kHeadsAndTimes);
+  message.AppendToString(&body);
   if (depth != nullptr) {
     append_message(v1::Frame::kDepthFieldNumber, depth->head, v1::DepthMap::kDataFieldNumber,
                    depth->data, body);

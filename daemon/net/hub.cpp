@@ -93,6 +93,11 @@ void Hub::on_event(const pipeline::Event& event) {
   if (const auto* reference = std::get_if<pipeline::ReferenceTaken>(&event)) {
     reference_taken_ns_.reset();
     if (!reference->restored) reference_taken_ns_ = reference->at.monotonic_ns;
+    config_.log({.level = LogLevel::debug,
+                 .text = reference->restored
+                             ? "the last good reference is used until a new one is taken"
+                             : "a new reference is taken",
+                 .subject = LogSubject::change});
   }
   v1::ServerMessage message;
   if (fill(event, *message.mutable_event())) session_list_.broadcast(message);

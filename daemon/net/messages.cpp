@@ -142,6 +142,7 @@ void fill_camera(const hal::CameraInfo& info, const hal::CameraReport& report,
     to.set_verdict(to_wire(control.verdict));
     to.set_note(control.note);
   }
+  fill(info.settings, *out.mutable_settings());
 }
 
 v1::Surface::Shape to_wire(recon::Surface::Kind kind) {
@@ -163,6 +164,9 @@ void fill(const recon::Surface& surface, v1::Surface& out) {
   out.set_air_mm(surface.air_mm);
   out.set_gel_mm(surface.gel_mm);
   out.set_refraction(surface.refraction);
+  out.set_foot_x_mm(surface.view.foot_mm.x);
+  out.set_foot_y_mm(surface.view.foot_mm.y);
+  out.set_per_mm(surface.view.per_mm);
 }
 
 }  // namespace
@@ -177,6 +181,16 @@ void fill(const hal::Light& light, std::optional<std::int64_t> since_ns, v1::Lig
     to.set_g(led.g);
     to.set_b(led.b);
   }
+}
+
+void fill(const hal::CameraSettings& settings, v1::CameraSettings& out) {
+  const auto fill_one = [](const hal::CameraSetting& setting, v1::CameraSetting& to) {
+    to.set_value(setting.value);
+    to.set_minimum(setting.minimum);
+    to.set_maximum(setting.maximum);
+  };
+  if (settings.exposure_us) fill_one(*settings.exposure_us, *out.mutable_exposure_us());
+  if (settings.gain) fill_one(*settings.gain, *out.mutable_gain());
 }
 
 void fill(const pipeline::ContactSummary& contact, v1::Contact& out) {
@@ -209,7 +223,7 @@ void fill(const pipeline::DepthFrame& frame, v1::Frame& out) {
   if (frame.contact_absence == pipeline::ContactAbsence::none) {
     fill(frame.contact, *out.mutable_contact());
   }
-  if (frame.has_depth && frame.surface.kind != recon::Surface::Kind::plane) {
+  if (frame.has_depth && frame.surface != recon::Surface{}) {
     fill(frame.surface, *out.mutable_surface());
   }
 }
@@ -228,6 +242,9 @@ void fill(const pipeline::StageTimes& times, std::int64_t encode_ns, v1::StageTi
 void fill(const pipeline::Status& status, v1::Status& out) {
   out.set_state(to_wire(status.state));
   fill_health(status.health, out);
+  for (const int flag : out.health()) {
+    out.add_fixes(fix(status, static_cast<Health>(flag - 1)));
+  }
   out.set_advice(advice(status));
   fill_camera(status.camera, status.camera_report, *out.mutable_camera());
   out.mutable_ring()->set_backend(status.ring.backend);

@@ -8,6 +8,7 @@
 
 namespace dtact::v1 {
 class CalibrationSummary;
+class CameraSettings;
 class Contact;
 class Event;
 class Frame;
@@ -23,6 +24,7 @@ class StoredCalibration;
 namespace dtact::net {
 
 void fill(const hal::Light& light, std::optional<std::int64_t> since_ns, v1::LightState& out);
+void fill(const hal::CameraSettings& settings, v1::CameraSettings& out);
 void fill(const pipeline::ContactSummary& contact, v1::Contact& out);
 /// Everything but the maps, `dropped`, `times` and `calibration`.
 void fill(const pipeline::DepthFrame& frame, v1::Frame& out);

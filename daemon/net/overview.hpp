@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "daemon/pipeline/port.hpp"
+#include "hal/base/machine.hpp"
 #include "proto/dtact.pb.h"
 
 namespace dtact::net {
@@ -23,6 +24,7 @@ struct Overview {
   v1::Status status;
   std::vector<pipeline::StageStatistics> stages;  ///< Those of `status`, with their counts.
   Traffic traffic;
+  std::vector<base::Temperature> temperatures;     ///< Of the board, some seconds old at most.
   std::optional<std::int64_t> reference_taken_ns;  ///< See Hub::reference_taken_ns().
 };
 

@@ -8,6 +8,8 @@
 #include <utility>
 #include <vector>
 
+#include "hal/base/utf8.hpp"
+#include "proto/defaults.hpp"
 #include "proto/dtact.pb.h"
 
 namespace dtact::net {
@@ -41,8 +43,8 @@ std::string read(const Words& words, std::string_view field, const std::string& 
   if (found == words.end()) {
     std::string known;
     for (const auto& entry : words) known += (known.empty() ? "" : ", ") + entry.first;
-    return fmt::format("set_reconstruction.{}: \"{}\" is unknown; known are {}", field, word,
-                       known);
+    return fmt::format("set_reconstruction.{}: \"{}\" is unknown; known are {}", field,
+                       base::first_bytes(word, wire::kMaxCalibrationName), known);
   }
   value = found->second;
   return {};

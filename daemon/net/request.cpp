@@ -37,6 +37,13 @@ bool submit(pipeline::Port& port, const Requester& requester,
   return false;
 }
 
+Requester::Requester(const std::shared_ptr<Session>& session, const v1::ClientMessage& message,
+                     const Log& log)
+    : session_(session),
+      id_(message.id()),
+      change_(describe_change(*session, message)),
+      log_(&log) {}
+
 void Requester::reply(const std::function<void(v1::Reply&)>& fill, bool first,
                       const std::string& result) const {
   log_change(*log_, change_, result);

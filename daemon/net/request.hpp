@@ -25,11 +25,7 @@ class Requester {
  public:
   /// `log` must outlive what answers.
   Requester(const std::shared_ptr<Session>& session, const v1::ClientMessage& message,
-            const Log& log)
-      : session_(session),
-        id_(message.id()),
-        change_(describe_change(*session, message)),
-        log_(&log) {}
+            const Log& log);
 
   /// Null when the client is gone.
   [[nodiscard]] std::shared_ptr<Session> session() const { return session_.lock(); }

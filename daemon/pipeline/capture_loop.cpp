@@ -84,6 +84,7 @@ void CaptureLoop::take_notes() noexcept {
       timeline_.change_ends(note.light, note.at_ns, note.failed);
     }
     tracker_.light_changed(before);
+    if (note.camera) tracker_.exposure_changed();
     // What was seen under no light or an unknown one counts no more than before a start.
     if (note.returned) tracker_.camera_began();
   }

@@ -23,8 +23,8 @@ void CommandExecutor::take(bool camera_away, const Stamp& now) noexcept {
           using What = std::remove_reference_t<decltype(what)>;
           if constexpr (std::is_same_v<What, Rezero>) {
             return execute(what, camera_away);
-          } else if constexpr (std::is_same_v<What, SetLight>) {
-            // Never here: Pipeline::submit() gives it to the light driver.
+          } else if constexpr (std::is_same_v<What, SetLight> || std::is_same_v<What, SetCamera>) {
+            // Never here: Pipeline::submit() gives them to the light driver.
             return Outcome::device_error;
           } else {
             return execute(what);

@@ -21,7 +21,7 @@ enum class Health : std::uint8_t {
   starting = 1,            ///< Start-up is not through: no reference yet.
   light_unsettled = 2,     ///< A light change is under way; depth is off until the next reference.
   reference_stale = 3,     ///< The reference does not belong to the present light.
-  reference_restored = 4,  ///< In contact at start: the last good reference is used.
+  reference_restored = 4,  ///< After a start: the last good reference is used.
   light_mismatch = 5,      ///< The ring shows another light than at calibration.
   camera_mismatch = 6,     ///< Camera, mode, format or controls differ from the calibration's, or a
                            ///< control moved by itself.

@@ -1,6 +1,7 @@
 #include "daemon/pipeline/light_driver.hpp"
 
 #include <chrono>
+#include <exception>
 #include <utility>
 
 namespace dtact::pipeline {
@@ -11,10 +12,11 @@ constexpr std::int64_t kRetryNs = 5'000'000;
 }  // namespace
 
 LightDriver::LightDriver(std::unique_ptr<hal::LightRing> ring, const hal::Light& light,
-                         base::Clock& clock, const Exchange& exchange)
+                         base::Clock& clock, const Exchange& exchange, hal::Camera* camera)
     : ring_(std::move(ring)),
       clock_(clock),
       exchange_(exchange),
+      camera_(camera),
       light_(light),
       requested_(light) {}
 
@@ -33,10 +35,13 @@ void LightDriver::stop() noexcept {
 bool LightDriver::submit(Command command) {
   {
     const std::scoped_lock lock(mutex_);
-    const hal::Light light = std::get<SetLight>(command.what).light;
+    std::optional<hal::Light> light;
+    if (const auto* set = std::get_if<SetLight>(&command.what)) light = set->light;
     if (!commands_.push(std::move(command))) return false;
-    requested_ = light;
-    ++waiting_;
+    if (light) {
+      requested_ = *light;
+      ++waiting_;
+    }
   }
   work_.ring();
   return true;
@@ -73,7 +78,22 @@ void LightDriver::run() {
   }
 }
 
+void LightDriver::set_camera(Command command) {
+  CommandDone done;
+  note({.begins = true, .at_ns = clock_.monotonic_ns(), .light = light(), .camera = true});
+  try {
+    camera_->change(std::get<SetCamera>(command.what).change);
+  } catch (const std::exception& e) {
+    done.outcome = Outcome::device_error;
+    done.message = e.what();
+  }
+  note({.begins = false, .at_ns = clock_.monotonic_ns(), .light = light(), .camera = true});
+  done.command = std::move(command);
+  emit(done);
+}
+
 void LightDriver::serve(Command command) {
+  if (std::holds_alternative<SetCamera>(command.what)) return set_camera(std::move(command));
   const hal::Light before = light();
   const hal::Light wanted = std::get<SetLight>(command.what).light;
   const hal::ShowResult result = write(wanted);
@@ -90,7 +110,7 @@ void LightDriver::serve(Command command) {
   } else {
     done.light_since_ns = light_since_ns();
   }
-  emit(std::move(done));
+  emit(done);
   if (result.ok && wanted != before) emit(changed());
 }
 
@@ -162,8 +182,8 @@ void LightDriver::note(const LightNote& note) {
   }
 }
 
-void LightDriver::emit(Event event) {
-  while (!events_.push(std::move(event)) && !stop_) {
+void LightDriver::emit(const Event& event) {
+  while (!events_.push(Event(event)) && !stop_) {
     clock_.sleep_until(clock_.monotonic_ns() + kRetryNs);
   }
   exchange_.wake.signal();

@@ -17,17 +17,19 @@
 
 namespace dtact::pipeline {
 
-/// What the capture thread has to know of a write to the ring.
+/// What the capture thread has to know of a write to the ring or to the camera's settings.
 struct LightNote {
   bool begins = false;     ///< The write is about to begin; else it is over.
   std::int64_t at_ns = 0;  ///< CLOCK_MONOTONIC.
   hal::Light light;        ///< What the ring is to show, or shows.
   bool returned = false;   ///< The ring was away until this write: what it showed is not known.
   bool failed = false;     ///< The write did not work.
+  bool camera = false;     ///< The ring stays: the camera's exposure or gain is written.
 };
 
 /// Owns the ring and the one thread that uses it: it writes, re-sends and executes commands, since
-/// a write blocks for at least a millisecond.
+/// a write blocks for at least a millisecond. Exposure and gain are set on it, too: to the picture
+/// they are a change of the light.
 /// Commands come from the network thread, events return there, notes go to the capture thread.
 /// Each has a queue of its own that never drops (a full one makes this thread wait).
 ///
@@ -35,9 +37,10 @@ struct LightNote {
 /// when it is back.
 class LightDriver {
  public:
-  /// `exchange` is where events are announced, and the newest frame is known.
+  /// `exchange` is where events are announced, and the newest frame is known. `camera` is that of
+  /// SetCamera.
   LightDriver(std::unique_ptr<hal::LightRing> ring, const hal::Light& light, base::Clock& clock,
-              const Exchange& exchange);
+              const Exchange& exchange, hal::Camera* camera = nullptr);
   LightDriver(const LightDriver&) = delete;
   LightDriver& operator=(const LightDriver&) = delete;
   ~LightDriver() { stop(); }
@@ -48,7 +51,7 @@ class LightDriver {
   void stop() noexcept;
 
   // Network thread.
-  /// A SetLight.
+  /// A SetLight or a SetCamera.
   [[nodiscard]] bool submit(Command command);
   [[nodiscard]] bool next_event(Event& out) { return events_.pop(out); }
   [[nodiscard]] hal::RingInfo info() const { return ring_->info(); }
@@ -68,16 +71,18 @@ class LightDriver {
  private:
   void run();
   void serve(Command command);
+  void set_camera(Command command);
   std::chrono::nanoseconds attend();
   void come_back();
   hal::ShowResult write(const hal::Light& light);
   void note(const LightNote& note);
-  void emit(Event event);
+  void emit(const Event& event);
   [[nodiscard]] LightChanged changed() const;
 
   std::unique_ptr<hal::LightRing> ring_;
   base::Clock& clock_;
   const Exchange& exchange_;
+  hal::Camera* const camera_;
   SpscQueue<Command, 16> commands_;
   SpscQueue<Event, 64> events_;
   SpscQueue<LightNote, 16> notes_;

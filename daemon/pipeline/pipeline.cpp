@@ -69,7 +69,7 @@ Pipeline::Pipeline(std::unique_ptr<hal::Camera> camera, std::unique_ptr<hal::Lig
       camera_(std::move(camera)),
       info_(checked(camera_->info())),
       exchange_(prototype(calibration.get())),
-      light_(std::move(ring), config_.light, clock, exchange_),
+      light_(std::move(ring), config_.light, clock, exchange_, camera_.get()),
       depth_capacity_(exchange_.slot.back().depth_um.capacity()),
       rules_(config_.reconstruction) {
   std::unique_ptr<ActiveCalibration> active;
@@ -156,11 +156,15 @@ void Pipeline::finish(CommandDone& done) {
     config_.calibration_note.clear();
     compare_camera();
   }
+  if (std::holds_alternative<SetCamera>(done.command.what)) compare_camera();
   if (const auto* how = std::get_if<SetReconstruction>(&done.command.what)) rules_ = how->rules;
 }
 
 bool Pipeline::submit(Command command) {
-  if (std::holds_alternative<SetLight>(command.what)) return light_.submit(std::move(command));
+  if (std::holds_alternative<SetLight>(command.what) ||
+      std::holds_alternative<SetCamera>(command.what)) {
+    return light_.submit(std::move(command));
+  }
   if (auto* to = std::get_if<CopyReference>(&command.what)) {
     to->copy = std::make_shared<ReferenceCopy>();
     to->copy->width = info_.width;

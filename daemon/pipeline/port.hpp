@@ -42,6 +42,10 @@ struct ReferenceCopy {
 struct SetLight {
   hal::Light light = {};
 };
+/// Within the ranges of Status::camera.settings.
+struct SetCamera {
+  hal::CameraChange change = {};
+};
 struct Rezero {
   bool force = false;  ///< Take the reference although in contact.
 };
@@ -63,7 +67,7 @@ struct SetReconstruction {
 /// The element of the command queues. It goes to the thread that executes it and comes back in one
 /// CommandDone, so that its memory is allocated and freed on the network's side only.
 struct Command {
-  std::variant<SetLight, Rezero, UseCalibration, CopyReference, SetReconstruction> what;
+  std::variant<SetLight, SetCamera, Rezero, UseCalibration, CopyReference, SetReconstruction> what;
   /// The caller's continuation, called when the CommandDone is fetched. The pipeline may keep
   /// the command longer than the caller lives: capture nothing that must not outlive the caller.
   std::function<void(const CommandDone&)> then = {};

@@ -22,6 +22,11 @@ constexpr double kBlur = 0.2;  // of the thickness
 constexpr std::size_t kMaxCells = 144;
 constexpr int kSteps = 5;  // of conjugate gradients; 12 change the force by 0.5 %
 
+std::size_t index_of(int row, int columns, int column) {
+  return static_cast<std::size_t>(row) * static_cast<std::size_t>(columns) +
+         static_cast<std::size_t>(column);
+}
+
 double compliance(double k, double h) {
   const double kh = k * h;
   if (kh < 1e-3) return kh * kh * h;
@@ -133,7 +138,7 @@ void CellMap::read(std::span<const std::int16_t> depth_um, const TileRows& tiles
         return std::accumulate(of.begin() + from, of.begin() + from + cell_px_, 0);
       };
       const int trusted = pixels - total(untrusted_);
-      mm_[static_cast<std::size_t>(row * columns_ + column)] =
+      mm_[index_of(row, columns_, column)] =
           2 * trusted > pixels
               ? static_cast<float>(total(sums_)) / static_cast<float>(1000 * trusted)
               : std::numeric_limits<float>::quiet_NaN();
@@ -144,11 +149,11 @@ void CellMap::read(std::span<const std::int16_t> depth_um, const TileRows& tiles
 bool CellMap::cut_off() const noexcept {
   const auto known = [&](int column, int row) {
     return column >= 0 && row >= 0 && column < columns_ && row < rows_ &&
-           !std::isnan(mm_[static_cast<std::size_t>(row * columns_ + column)]);
+           !std::isnan(mm_[index_of(row, columns_, column)]);
   };
   for (int row = 0; row < rows_; ++row) {
     for (int column = 0; column < columns_; ++column) {
-      if (!(mm_[static_cast<std::size_t>(row * columns_ + column)] > kContactMm)) continue;
+      if (!(mm_[index_of(row, columns_, column)] > kContactMm)) continue;
       if (!known(column - 1, row) || !known(column + 1, row) || !known(column, row - 1) ||
           !known(column, row + 1)) {
         return true;
@@ -186,9 +191,9 @@ GelResponse::Answer GelResponse::answer(const CellMap& map) noexcept {
     Level& coarse = levels_[++at];
     for (int row = 0; row < coarse.rows; ++row) {
       for (int column = 0; column < coarse.columns; ++column) {
-        const auto first = static_cast<std::size_t>(2 * row * fine.columns + 2 * column);
+        const auto first = index_of(2 * row, fine.columns, 2 * column);
         const auto below = first + static_cast<std::size_t>(fine.columns);
-        coarse.mm[static_cast<std::size_t>(row * coarse.columns + column)] =
+        coarse.mm[index_of(row, coarse.columns, column)] =
             (fine.mm[first] + fine.mm[first + 1] + fine.mm[below] + fine.mm[below + 1]) / 4;
       }
     }
@@ -209,7 +214,7 @@ bool GelResponse::collect(const Level& level) noexcept {
   cells_.clear();
   for (int row = 0; row < level.rows; ++row) {
     for (int column = 0; column < level.columns; ++column) {
-      const float mm = level.mm[static_cast<std::size_t>(row * level.columns + column)];
+      const float mm = level.mm[index_of(row, level.columns, column)];
       if (!(mm > kPressedMm)) continue;
       if (cells_.size() == kMaxCells) return false;
       cells_.push_back({column, row, mm});
@@ -223,9 +228,9 @@ void GelResponse::solve(const Level& level) noexcept {
   const std::size_t n = cells_.size();
   for (std::size_t i = 0; i < n; ++i) {
     for (std::size_t j = 0; j <= i; ++j) {
-      matrix_[i * n + j] = matrix_[j * n + i] = level.green[static_cast<std::size_t>(
-          std::abs(cells_[i].row - cells_[j].row) * level.columns +
-          std::abs(cells_[i].column - cells_[j].column))];
+      matrix_[i * n + j] = matrix_[j * n + i] =
+          level.green[index_of(std::abs(cells_[i].row - cells_[j].row), level.columns,
+                               std::abs(cells_[i].column - cells_[j].column))];
     }
   }
   const auto dot = [n](const std::vector<float>& a, const std::vector<float>& b) {

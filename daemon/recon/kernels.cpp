@@ -157,6 +157,13 @@ void sum_row(const std::int16_t* row_um, int y, int x0, int x1, DepthSums& sums)
       sums.um += um;
       sums.um_x += std::int64_t{um} * x;
       sums.um_y += std::int64_t{um} * y;
+      if (y % 2 == 0) {
+        // Of twice the depth, as an int16 in Q15, which vectors multiply by themselves.
+        const std::int64_t square = (4 * std::int64_t{um} * um + (1 << 14)) >> 15;
+        sums.square += square;
+        sums.square_x += square * x;
+        sums.square_y += square * y;
+      }
     }
     const bool earlier = y < sums.deepest_y || (y == sums.deepest_y && x < sums.deepest_x);
     if (um > sums.deepest_um || (um == sums.deepest_um && earlier)) {

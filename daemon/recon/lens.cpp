@@ -105,6 +105,17 @@ double central_mm_per_px(const Lens& lens) {
   return 1 / std::sqrt(j.xx * j.yy - j.xy * j.yx);
 }
 
+Point axis_foot(const Lens& lens) {
+  // Rows of the homography from the centre of distortion: q = A·x + t near the foot.
+  std::array<double, 6> a{};
+  for (std::size_t i = 0; i < 3; ++i) {
+    a[i] = lens.homography[i] - lens.centre_col * lens.homography[6 + i];
+    a[3 + i] = lens.homography[3 + i] - lens.centre_row * lens.homography[6 + i];
+  }
+  const double determinant = a[0] * a[4] - a[1] * a[3];
+  return {(a[1] * a[5] - a[4] * a[2]) / determinant, (a[3] * a[2] - a[0] * a[5]) / determinant};
+}
+
 void check(const Lens& lens, int frame_width, int frame_height) {
   const Point origin = project(lens, {0, 0});
   if (!(origin.x >= 0 && origin.x <= frame_width - 1 && origin.y >= 0 &&

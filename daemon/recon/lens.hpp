@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "daemon/recon/rectify.hpp"
+#include "daemon/recon/surface.hpp"
 
 namespace dtact::recon {
 
@@ -25,18 +26,16 @@ struct Lens {
   static constexpr std::size_t kMaxRadial = 6;
 };
 
-/// A pixel of the camera frame, or a place on the surface in millimetres.
-struct Point {
-  double x = 0;
-  double y = 0;
-};
-
 /// The pixel (column, row) at which the surface's point appears. NaN beyond the distance from the
 /// centre at which the distortion folds back on itself, and behind the camera.
 [[nodiscard]] Point project(const Lens& lens, Point mm);
 
 /// Millimetres a camera pixel spans about the surface's origin: the square root of its area.
 [[nodiscard]] double central_mm_per_px(const Lens& lens);
+
+/// The foot of the camera's axis on the surface, millimetres: what the homography shows at the
+/// centre of distortion, were it without perspective.
+[[nodiscard]] Point axis_foot(const Lens& lens);
 
 /// Throws std::invalid_argument unless the surface's origin is seen in a frame of this size,
 /// upright and not mirrored.

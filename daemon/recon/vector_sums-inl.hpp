@@ -41,9 +41,12 @@ HWY_NOINLINE void FindDeepest(D16 d16, V16 um, int x, int y, DepthSums& sums) {
   sums.deepest_y = y;
 }
 
+/// Columns are counted from this one of a part.
+constexpr int kMiddle = 256;
+
 /// Adds up the pixels [x0, x1) of one row: few enough columns that sums of depth times column are
-/// int32.
-template <class D16>
+/// int32. With the squares of an even row.
+template <bool kSquares, class D16>
 HWY_INLINE void SumRowPart(D16 d16, const int16_t* row, int y, int x0, int x1, DepthSums& sums) {
   using V16 = hn::VFromD<D16>;
   const hn::RepartitionToWide<D16> d32;
@@ -60,6 +63,8 @@ HWY_INLINE void SumRowPart(D16 d16, const int16_t* row, int y, int x0, int x1, D
   V16 shallow = ignored();
   PairSum<decltype(d32)> um{d32};
   PairSum<decltype(d32)> um_x{d32};
+  PairSum<decltype(d32)> square{d32};
+  PairSum<decltype(d32)> square_x{d32};
   size_t made = 0;
   size_t lost = 0;
   ForEachVector(d16, row, x0, x1, [&](int x, V16 pixels) HWY_ATTR {
@@ -68,8 +73,15 @@ HWY_INLINE void SumRowPart(D16 d16, const int16_t* row, int y, int x0, int x1, D
     const auto pressed = hn::Gt(pixels, threshold_um);
     made += hn::CountTrue(d16, pressed);
     const V16 depth = hn::IfThenElseZero(pressed, pixels);
+    const V16 column = hn::Add(columns, hn::Set(d16, static_cast<int16_t>(x - x0 - kMiddle)));
     um.Add(depth, one);
-    um_x.Add(depth, hn::Add(columns, hn::Set(d16, static_cast<int16_t>(x - x0))));
+    um_x.Add(depth, column);
+    if constexpr (kSquares) {
+      const V16 twice = hn::Add(depth, depth);
+      const V16 squared = hn::MulFixedPoint15(twice, twice);
+      square.Add(squared, one);
+      square_x.Add(squared, column);
+    }
     const auto below =
         hn::Set(d16, static_cast<int16_t>(HWY_MAX(sums.deepest_um - 1, int{kUntrusted})));
     if (HWY_UNLIKELY(!hn::AllFalse(d16, hn::Gt(pixels, below)))) {
@@ -83,24 +95,33 @@ HWY_INLINE void SumRowPart(D16 d16, const int16_t* row, int y, int x0, int x1, D
   const std::int64_t part_um = hn::GetLane(hn::SumOfLanes(d32, um.Total()));
   const std::int64_t part_um_x = hn::GetLane(hn::SumOfLanes(d32, um_x.Total()));
   sums.um += part_um;
-  sums.um_x += part_um_x + part_um * x0;
+  sums.um_x += part_um_x + part_um * (x0 + kMiddle);
   sums.um_y += part_um * y;
+  if constexpr (!kSquares) return;
+  const std::int64_t part_square = hn::GetLane(hn::SumOfLanes(d32, square.Total()));
+  const std::int64_t part_square_x = hn::GetLane(hn::SumOfLanes(d32, square_x.Total()));
+  sums.square += part_square;
+  sums.square_x += part_square_x + part_square * (x0 + kMiddle);
+  sums.square_y += part_square * y;
 }
 
 void SumRows(const int16_t* depth_um, std::ptrdiff_t stride, int x0, int x1, int y0, int y1,
              DepthSums& sums) {
   const hn::CappedTag<int16_t, kBlock> d16;
   constexpr int kLanes = static_cast<int>(hn::MaxLanes(d16));
-  // 16383 µm × (0 + 1 + … + 511) is less than 2³¹.
-  constexpr int kPart = 512;
+  // 32764, the largest square, × (0 + 1 + … + 256), columns being counted from the middle, is less
+  // than 2³¹.
+  constexpr int kPart = 2 * kMiddle;
   for (int y = y0; y < y1; ++y) {
     const int16_t* const row = depth_um + y * stride;
     for (int x = x0; x < x1; x += kPart) {
       const int end = HWY_MIN(x + kPart, x1);
       if (end - x < kLanes) {
         kernels::sum_row(row, y, x, end, sums);
+      } else if (y % 2 == 0) {
+        SumRowPart<true>(d16, row, y, x, end, sums);
       } else {
-        SumRowPart(d16, row, y, x, end, sums);
+        SumRowPart<false>(d16, row, y, x, end, sums);
       }
     }
   }

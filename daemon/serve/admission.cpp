@@ -20,9 +20,9 @@ Admission::Admission(const NetConfig& config) : config_(config), tokens_(read_to
 Admission::Verdict Admission::judge(const Peer& peer, const std::string& token) {
   Verdict verdict;
   if (peer.trusted) {
-    verdict.grant = {.rights = Rights::calibrate, .name = {}, .digest = {}};
+    verdict.grant = {.rights = Rights::calibrate, .name = {}, .hash = {}};
   } else if (!tokens_.has_value()) {
-    verdict.grant = {.rights = config_.anonymous_rights, .name = {}, .digest = {}};
+    verdict.grant = {.rights = config_.anonymous_rights, .name = {}, .hash = {}};
   } else {
     verdict.grant = tokens_->find(token);
   }
@@ -82,38 +82,34 @@ void Admission::leave(const Peer& peer) {
   if (--host->second == 0) hosts_.erase(host);
 }
 
-bool Admission::hold(std::size_t before, std::size_t now) noexcept {
-  incoming_ = incoming_ - before + now;
-  return now <= before || incoming_ <= kMaxIncoming;
-}
-
-void Admission::unread(const void* client, const std::string& host, std::size_t bytes,
-                       std::function<void()> disconnect) {
-  if (const auto found = unread_.find(client); found != unread_.end()) {
-    unread_bytes_ -= found->second.bytes;
-    unread_.erase(found);
+void Admission::hold(const void* client, const std::string& host, std::size_t bytes,
+                     std::function<void()> disconnect) {
+  if (const auto found = held_.find(client); found != held_.end()) {
+    held_bytes_ -= found->second.bytes;
+    held_.erase(found);
   }
   if (bytes == 0) return;
-  unread_[client] = {host, bytes, std::move(disconnect)};
-  unread_bytes_ += bytes;
-  while (unread_bytes_ > kMaxUnread) {
+  held_[client] = {host, bytes, std::move(disconnect)};
+  held_bytes_ += bytes;
+  while (held_bytes_ > kMaxHeld) {
     const auto worst = worst_beside(client);
-    if (worst == unread_.end()) return;  // one alone has at most Outbox::kMaxBytes and a message
+    // One alone has at most Outbox::kMaxBytes and a message each way.
+    if (worst == held_.end()) return;
     const auto end = std::move(worst->second.disconnect);
-    unread_bytes_ -= worst->second.bytes;
-    unread_.erase(worst);
+    held_bytes_ -= worst->second.bytes;
+    held_.erase(worst);
     end();
   }
 }
 
-Admission::UnreadMap::iterator Admission::worst_beside(const void* asking) {
+Admission::HeldMap::iterator Admission::worst_beside(const void* asking) {
   std::map<std::string_view, std::size_t> hosts;
-  for (const auto& [client, one] : unread_) hosts[one.host] += one.bytes;
-  auto worst = unread_.end();
-  const auto weight = [&](const Unread& one) { return std::pair(hosts[one.host], one.bytes); };
-  for (auto it = unread_.begin(); it != unread_.end(); ++it) {
+  for (const auto& [client, one] : held_) hosts[one.host] += one.bytes;
+  auto worst = held_.end();
+  const auto weight = [&](const Held& one) { return std::pair(hosts[one.host], one.bytes); };
+  for (auto it = held_.begin(); it != held_.end(); ++it) {
     if (it->first == asking) continue;
-    if (worst == unread_.end() || weight(it->second) > weight(worst->second)) worst = it;
+    if (worst == held_.end() || weight(it->second) > weight(worst->second)) worst = it;
   }
   return worst;
 }

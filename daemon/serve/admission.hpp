@@ -23,11 +23,9 @@ namespace dtact::net {
 /// together take. On the network thread.
 class Admission {
  public:
-  /// Bytes of large messages that have arrived in part, of all clients together: two of the
-  /// longest.
-  static constexpr std::size_t kMaxIncoming = std::size_t{32} << 20U;
-  /// Bytes of large answers that are unread, of all clients together: two of the longest.
-  static constexpr std::size_t kMaxUnread = std::size_t{32} << 20U;
+  /// Bytes of large messages that have arrived in part, and of large answers that are unread, of
+  /// all clients together: two of the longest.
+  static constexpr std::size_t kMaxHeld = std::size_t{32} << 20U;
   /// Delay of the answer to an address's first wrong token. It doubles with each further one.
   static constexpr std::chrono::milliseconds kDenial{500};
   static constexpr std::chrono::milliseconds kMaxDenial{16'000};
@@ -59,24 +57,20 @@ class Admission {
   void leave(const Peer& peer);
   /// False: its token was revoked since, or has other rights now.
   [[nodiscard]] bool still_allows(const Tokens::Grant& grant) const {
-    return !grant.digest || (tokens_ && tokens_->holds(grant));
+    return grant.hash.empty() || (tokens_ && tokens_->holds(grant));
   }
 
-  /// A client's message takes `now` bytes instead of `before`. False when that is too much for all
-  /// of them together; it counts all the same.
-  [[nodiscard]] bool hold(std::size_t before, std::size_t now) noexcept;
-  /// `bytes` of the answers to `client`, of Peer.host `host`, are unread. When all clients together
-  /// have more than kMaxUnread, others are disconnected: those with most of the host that has most.
-  /// `disconnect` is called then, and ends the connection.
-  void unread(const void* client, const std::string& host, std::size_t bytes,
-              std::function<void()> disconnect);
+  /// `bytes` of large messages from and to `client`, of Peer.host `host`, are held. When all
+  /// clients together have more than kMaxHeld, others are disconnected: those with most of the host
+  /// that has most. `disconnect` is called then, and ends the connection.
+  void hold(const void* client, const std::string& host, std::size_t bytes,
+            std::function<void()> disconnect);
 
  private:
   const NetConfig& config_;
   std::optional<Tokens> tokens_;
   std::size_t clients_ = 0;
   std::map<std::string, std::size_t> hosts_;  ///< Clients by Peer.host.
-  std::size_t incoming_ = 0;
 
   using Clock = std::chrono::steady_clock;
   struct Wrong {
@@ -88,16 +82,16 @@ class Admission {
   [[nodiscard]] std::chrono::milliseconds delay_after_wrong(const std::string& host);
   std::map<std::string, Wrong> wrong_;  ///< … by Peer.host.
 
-  struct Unread {
+  struct Held {
     std::string host;
     std::size_t bytes = 0;
     std::function<void()> disconnect;
   };
-  using UnreadMap = std::map<const void*, Unread>;
+  using HeldMap = std::map<const void*, Held>;
   /// The client to give up for `asking`; end(): there is no other.
-  [[nodiscard]] UnreadMap::iterator worst_beside(const void* asking);
-  UnreadMap unread_;  ///< By client, without those that have nothing unread.
-  std::size_t unread_bytes_ = 0;
+  [[nodiscard]] HeldMap::iterator worst_beside(const void* asking);
+  HeldMap held_;  ///< By client, without those of which nothing is held.
+  std::size_t held_bytes_ = 0;
 };
 
 }  // namespace dtact::net

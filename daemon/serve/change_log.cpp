@@ -16,7 +16,7 @@ namespace {
 
 /// A word that the client chose.
 std::string quoted(const std::string& word) {
-  return fmt::format("\"{}\"", printable(base::first_bytes(word, wire::kMaxCalibrationName)));
+  return fmt::format("\"{}\"", base::printable(base::first_bytes(word, wire::kMaxCalibrationName)));
 }
 
 std::string values_of(const v1::SetLight& request) {
@@ -37,6 +37,14 @@ std::string values_of(const v1::SetLight& request) {
   return fmt::format("{}", fmt::join(values, ", "));
 }
 
+std::string values_of(const v1::SetCamera& request) {
+  std::vector<std::string> values;
+  if (request.has_exposure_us())
+    values.push_back(fmt::format("exposure_us {}", request.exposure_us()));
+  if (request.has_gain()) values.push_back(fmt::format("gain {}", request.gain()));
+  return fmt::format("{}", fmt::join(values, ", "));
+}
+
 std::string values_of(const v1::SetReconstruction& request) {
   std::vector<std::string> values;
   if (request.has_resolution()) values.push_back("resolution " + quoted(request.resolution()));
@@ -52,6 +60,8 @@ std::string request_of(const v1::ClientMessage& message) {
   switch (message.request_case()) {
     case v1::ClientMessage::kSetLight:
       return "set_light " + values_of(message.set_light());
+    case v1::ClientMessage::kSetCamera:
+      return "set_camera " + values_of(message.set_camera());
     case v1::ClientMessage::kRezero:
       return message.rezero().force() ? "rezero force" : "rezero";
     case v1::ClientMessage::kSetReconstruction:
@@ -81,19 +91,13 @@ std::string request_of(const v1::ClientMessage& message) {
 
 }  // namespace
 
-std::string printable(std::string text) {
-  std::replace_if(
-      text.begin(), text.end(), [](unsigned char c) { return c < 0x20 || c == 0x7f; }, '?');
-  return text;
-}
-
 ChangeRecord describe_change(const Session& session, const v1::ClientMessage& message) {
   const std::string request = request_of(message);
   if (request.empty()) return {};
   std::string who = session.identity();
   if (!message.on_behalf_of().empty()) {
     who += " on behalf of " +
-           printable(base::first_bytes(message.on_behalf_of(), wire::kMaxOnBehalfOf));
+           base::printable(base::first_bytes(message.on_behalf_of(), wire::kMaxOnBehalfOf));
   }
   return {fmt::format("{}: {}", who, request), session.peer().address, session.token_name()};
 }

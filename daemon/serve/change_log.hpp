@@ -12,9 +12,6 @@ namespace dtact::net {
 
 class Session;
 
-/// `text` without control characters, for the log.
-[[nodiscard]] std::string printable(std::string text);
-
 /// The log line of a request that changes something, without its result.
 struct ChangeRecord {
   /// "192.168.1.7:40312 (dtactctl 0.1.0, token arm): set_light brightness 128"; empty for a request

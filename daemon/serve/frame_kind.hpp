@@ -31,6 +31,7 @@ struct FrameKind {
   bool jpeg = false;
   int cloud = 0;  ///< dtact.v1.CloudEncoding; of `spec` and `contact_box`.
   bool pose = false;
+  int recognition = 0;  ///< Contacts joined; 0: none.
   bool operator==(const FrameKind&) const = default;
 };
 

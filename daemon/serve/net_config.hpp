@@ -14,7 +14,7 @@
 
 namespace dtact::net {
 
-enum class LogLevel : std::uint8_t { info, warning };
+enum class LogLevel : std::uint8_t { debug, info, warning };
 
 /// What a line is about. Each has a rate limit of its own (limited()).
 enum class LogSubject : std::uint8_t {
@@ -58,6 +58,7 @@ struct NetConfig {
   int max_requests_per_s = 500;
   std::string frame_id = "dtact_surface";  ///< Name of the surface frame in every message.
   std::string name;                        ///< The daemon's own, in the handshake and status.
+  std::string instance;                    ///< HelloReply.instance.
   std::string program = "dtactd";          ///< "dtactd 0.1.0": in the handshake.
   std::string version;                     ///< "0.1.0": in status.
   /// HelloReply.features: of what lives as long as the program.
@@ -70,6 +71,7 @@ struct NetConfig {
   /// normal scheduling. Set by the owner of the thread, …
   int fifo_priority = 20;
   std::string realtime_refused;  ///< … and says here why it was refused; in status.
+  std::filesystem::path thermal_folder = "/sys/class/thermal";  ///< See base::temperatures().
   Log log = [](const LogLine&) {};
 };
 

@@ -34,7 +34,7 @@ void check_security(const NetConfig& config) {
   }
   if (config.token_file.empty()) {
     if (!missing.empty()) missing += " and ";
-    missing += "net.tokens (dtactctl token --new control prints a line for it)";
+    missing += "net.tokens (dtactctl token --new control -o FILE prints a line for it)";
   }
   throw std::runtime_error(fmt::format(
       "net.address = \"{}\" opens the sensor to other machines, which needs TLS and a "

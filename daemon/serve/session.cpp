@@ -9,6 +9,7 @@
 
 #include "daemon/serve/change_log.hpp"
 #include "daemon/serve/large_message.hpp"
+#include "hal/base/utf8.hpp"
 #include "proto/dtact.pb.h"
 
 namespace dtact::net {
@@ -31,6 +32,7 @@ constexpr std::size_t kInput = 16384;
 Rights rights_for(v1::ClientMessage::RequestCase request) {
   switch (request) {
     case v1::ClientMessage::kSetLight:
+    case v1::ClientMessage::kSetCamera:
     case v1::ClientMessage::kRezero:
     case v1::ClientMessage::kSetReconstruction:
       return Rights::control;
@@ -108,23 +110,22 @@ void Session::take(std::string_view input) {
                       "lengths",
                       decoder_.announced(), decoder_.cap(), grant_ ? "" : " before Hello"));
     }
-    if (!has_room()) {
-      return end_with(0, v1::ERROR_FLOOD,
-                      fmt::format("the large messages of all clients together would take more than "
-                                  "{} bytes: send it again when others are through",
-                                  Admission::kMaxIncoming));
-    }
+    note_held();
     if (result == wire::MessageDecoder::Result::need_more) return;
     on_message();
   }
 }
 
-bool Session::has_room() {
-  const std::size_t now = decoder_.held() > kSmall ? decoder_.held() : 0;
-  const std::size_t before = std::exchange(held_, now);
-  if (before == 0 && now > 0) arm_timer(kArrival, "a large message did not arrive in time");
-  if (before > 0 && now == 0) timer_.cancel();
-  return admission_.hold(before, now);
+void Session::note_held() {
+  const auto large = [](std::size_t bytes) { return bytes > kSmall ? bytes : 0; };
+  const std::size_t arriving = large(decoder_.held());
+  const std::size_t before = std::exchange(arriving_, arriving);
+  if (before == 0 && arriving > 0) arm_timer(kArrival, "a large message did not arrive in time");
+  if (before > 0 && arriving == 0) timer_.cancel();
+  admission_.hold(this, peer().host, arriving + large(outbox_.waiting_bytes()), [this] {
+    close("the large messages of all clients took too much memory, most of it here",
+          LogLevel::warning);
+  });
 }
 
 void Session::on_message() {
@@ -145,7 +146,7 @@ void Session::on_message() {
   v1::ClientMessage message;
   const bool parsed = message.ParseFromString(decoder_.message());
   decoder_.release();
-  (void)has_room();  // less than before
+  note_held();
   if (!parsed) {
     return end_with(0, v1::ERROR_BAD_MESSAGE,
                     "that was not a ClientMessage: check the client's copy of dtact.proto");
@@ -198,10 +199,11 @@ void Session::on_hello(std::uint64_t id, const v1::Hello& hello) {
   // It is the connection that is refused, as by daemons that said so before Hello: id 0.
   if (!verdict.grant) return end_with(0, verdict.error_code, verdict.sentence);
   grant_ = verdict.grant;
+  transport_->on_authenticated();
   timer_.cancel();
   state_ = State::ready;
   decoder_.set_cap(wire::kMaxMessage);
-  program_ = printable(hello.program());
+  program_ = base::printable(hello.program());
   config_.log({LogLevel::info,
                fmt::format("client {} ({}) connected{}{}", peer().address, program_,
                            grant_->name.empty() ? "" : " as ", grant_->name),
@@ -215,6 +217,7 @@ void Session::on_hello(std::uint64_t id, const v1::Hello& hello) {
   for (const char* feature : config_.features) reply.add_features(feature);
   reply.set_rights(static_cast<v1::Rights>(grant_->rights));
   reply.set_name(config_.name);
+  reply.set_instance(config_.instance);
   auto& frame = *reply.mutable_surface_frame();
   frame.set_frame_id(config_.frame_id);
   frame.set_right_handed(true);
@@ -243,7 +246,7 @@ std::string Session::identity() const {
 }
 
 void Session::end_if_revoked() {
-  if (state_ != State::ready || admission_.still_allows(*grant_)) return;
+  if (state_ != State::ready || !grant_ || admission_.still_allows(*grant_)) return;
   end_with(
       0, v1::ERROR_DENIED,
       "this client's token was revoked, or given other rights: connect with one that is in the "
@@ -271,7 +274,7 @@ void Session::end_with(std::uint64_t id, int error_code_, const std::string& sen
   // the sending side ends first, and what still comes is read and thrown away for a while.
   state_ = State::ending;
   decoder_.release();
-  (void)has_room();
+  note_held();
   arm_timer(kLinger, "ended");
   outbox_.finish();
 }
@@ -289,14 +292,6 @@ void Session::send(const v1::ServerMessage& message, bool first) {
   if (!outbox_.push(message, first)) {
     close(fmt::format("{} lay unread", outbox_.backlog()), LogLevel::warning);
   }
-}
-
-void Session::on_waiting_changed() {
-  const std::size_t bytes = outbox_.waiting_bytes() > kSmall ? outbox_.waiting_bytes() : 0;
-  admission_.unread(this, peer().host, bytes, [this] {
-    close("the unread answers of all clients took too much memory, most of it here",
-          LogLevel::warning);
-  });
 }
 
 void Session::subscribe(const Subscription& subscription) {
@@ -332,8 +327,7 @@ void Session::close(const std::string& reason, LogLevel level) {
   const bool known = state_ == State::ready;
   state_ = State::closed;
   if (grant_) admission_.leave(peer());
-  (void)admission_.hold(std::exchange(held_, 0), 0);
-  admission_.unread(this, peer().host, 0, {});
+  admission_.hold(this, peer().host, 0, {});
   transport_->close();
   timer_.cancel();
   outbox_.close();

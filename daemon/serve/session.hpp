@@ -104,8 +104,8 @@ class Session : public std::enable_shared_from_this<Session>, private Outbox::Ow
   void arm_timer(std::chrono::milliseconds after, const char* reason);
   void read();
   void take(std::string_view input);
-  /// Whether the messages of all clients leave room for what this one has sent of its own.
-  [[nodiscard]] bool has_room();
+  /// Reports to `admission_` how much of large messages is held for this client.
+  void note_held();
   void on_message();
   void on_hello(std::uint64_t id, const v1::Hello& hello);
   /// Answers after a while, so that guessing takes its time, and ends.
@@ -116,7 +116,7 @@ class Session : public std::enable_shared_from_this<Session>, private Outbox::Ow
   [[nodiscard]] LogSubject subject() const noexcept;
   std::shared_ptr<void> hold() override { return shared_from_this(); }
   void on_write_failed(const std::string& reason) override { close(reason); }
-  void on_waiting_changed() override;
+  void on_waiting_changed() override { note_held(); }
 
   std::unique_ptr<Transport> transport_;
   Outbox outbox_;
@@ -135,7 +135,7 @@ class Session : public std::enable_shared_from_this<Session>, private Outbox::Ow
   TokenBucket requests_;
   std::vector<char> input_;
   wire::MessageDecoder decoder_{wire::kMaxBeforeHello};
-  std::size_t held_ = 0;  ///< Bytes of a large message, as `admission_` has them.
+  std::size_t arriving_ = 0;  ///< Bytes of a large message that has come in part.
 };
 
 }  // namespace dtact::net

@@ -14,6 +14,8 @@
 namespace dtact::net {
 namespace {
 
+constexpr std::uint32_t kMaxPresses = 10;  // joined in one recognition
+
 Refusal invalid(std::string sentence) { return {v1::ERROR_INVALID, std::move(sentence)}; }
 
 std::optional<Refusal> check_encodings(const v1::Subscribe& request) {
@@ -35,11 +37,13 @@ std::optional<Refusal> check_encodings(const v1::Subscribe& request) {
 std::optional<Refusal> check_parts(const v1::Subscribe& request, Serves serves) {
   const bool images =
       request.depth() != v1::DEPTH_NONE || request.luma() != v1::LUMA_NONE || request.jpeg();
-  const bool geometry = request.cloud() != v1::CLOUD_NONE || request.pose();
+  const bool geometry =
+      request.cloud() != v1::CLOUD_NONE || request.pose() || request.recognition();
   if (serves == Serves::images && geometry) {
-    return Refusal{v1::ERROR_UNSUPPORTED,
-                   "subscribe.cloud and subscribe.pose: dtactd makes neither; connect to the "
-                   "dtact-perceive that runs beside it, port 7378 unless configured"};
+    return Refusal{
+        v1::ERROR_UNSUPPORTED,
+        "subscribe.cloud, pose and recognition: dtactd makes none of them; connect to the "
+        "dtact-perceive that runs beside it, port 7378 unless configured"};
   }
   if (serves == Serves::geometry && images) {
     return Refusal{v1::ERROR_UNSUPPORTED,
@@ -55,12 +59,14 @@ std::optional<Refusal> check_parts(const v1::Subscribe& request, Serves serves) 
 }
 
 std::optional<Refusal> check_rates(const v1::Subscribe& request) {
-  const std::array<std::pair<const char*, double>, 6> rates{{{"depth_hz", request.depth_hz()},
-                                                             {"luma_hz", request.luma_hz()},
-                                                             {"jpeg_hz", request.jpeg_hz()},
-                                                             {"summary_hz", request.summary_hz()},
-                                                             {"cloud_hz", request.cloud_hz()},
-                                                             {"pose_hz", request.pose_hz()}}};
+  const std::array<std::pair<const char*, double>, 7> rates{
+      {{"depth_hz", request.depth_hz()},
+       {"luma_hz", request.luma_hz()},
+       {"jpeg_hz", request.jpeg_hz()},
+       {"summary_hz", request.summary_hz()},
+       {"cloud_hz", request.cloud_hz()},
+       {"pose_hz", request.pose_hz()},
+       {"recognition_hz", request.recognition_hz()}}};
   for (const auto& [name, hz] : rates) {
     // Not by what is outside, since that is false of NaN.
     if (hz == 0 || (hz >= 0.01 && hz <= 1000)) continue;
@@ -81,6 +87,11 @@ std::optional<Refusal> check_map(const v1::Subscribe& request, Subscription::Map
   if (!one_of(request.um_per_unit(), 1, 2, 5, 10)) {
     return invalid(fmt::format("subscribe.um_per_unit: {}; allowed are 1, 2, 5 and 10, and 0 for 1",
                                request.um_per_unit()));
+  }
+  if (request.recognition_presses() > kMaxPresses) {
+    return invalid(
+        fmt::format("subscribe.recognition_presses: {}; allowed are 1 to {}, and 0 for 1",
+                    request.recognition_presses(), kMaxPresses));
   }
   if (!request.has_box()) return std::nullopt;
   const auto& box = request.box();
@@ -129,7 +140,8 @@ std::variant<Subscription, Refusal> Subscription::from(const v1::Subscribe& requ
                 .luma = request.luma(),
                 .jpeg = request.jpeg(),
                 .cloud = request.cloud(),
-                .pose = request.pose()};
+                .pose = request.pose(),
+                .recognition = std::max(1, static_cast<int>(request.recognition_presses()))};
   if (request.has_box()) {
     const auto& box = request.box();
     made.kind_.spec.region = DepthRegion{box.x(), box.y(), box.width(), box.height()};
@@ -145,6 +157,7 @@ std::variant<Subscription, Refusal> Subscription::from(const v1::Subscribe& requ
   ask(request.jpeg(), kJpeg, made.jpeg_, request.jpeg_hz());
   ask(request.cloud() != v1::CLOUD_NONE, kCloud, made.cloud_, request.cloud_hz());
   ask(request.pose(), kPose, made.pose_, request.pose_hz());
+  ask(request.recognition(), kRecognition, made.recognition_, request.recognition_hz());
   ask(request.summary(), kSummary, made.summary_, request.summary_hz());
   made.every_ = std::max(1U, request.every());
   made.events_ = !request.has_events() || request.events();
@@ -173,6 +186,7 @@ Subscription::Due Subscription::next(std::int64_t timestamp_ns, std::uint64_t mi
   ask(kJpeg, jpeg_);
   ask(kCloud, cloud_);
   ask(kPose, pose_);
+  ask(kRecognition, recognition_);
   return due;
 }
 
@@ -187,6 +201,7 @@ FrameKind Subscription::kind(Parts parts) const {
   if ((parts & kLuma) != 0) kind.luma = kind_.luma;
   kind.jpeg = (parts & kJpeg) != 0;
   kind.pose = (parts & kPose) != 0;
+  if ((parts & kRecognition) != 0) kind.recognition = kind_.recognition;
   return kind;
 }
 

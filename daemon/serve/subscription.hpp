@@ -33,7 +33,7 @@ class RateLimit {
 /// Which parts a program has besides the summary; the other ones are refused.
 enum class Serves : std::uint8_t {
   images,     ///< Depth, luma and JPEG: dtactd.
-  geometry,   ///< Point clouds and poses: dtact-perceive.
+  geometry,   ///< Point clouds, poses and recognition: dtact-perceive.
   everything  ///< What those do that stand behind it: dtact-web.
 };
 
@@ -60,6 +60,7 @@ class Subscription {
   static constexpr Parts kJpeg = 8;
   static constexpr Parts kCloud = 16;
   static constexpr Parts kPose = 32;
+  static constexpr Parts kRecognition = 64;
 
   struct Due {
     Parts parts = 0;           ///< 0: no message.
@@ -84,6 +85,7 @@ class Subscription {
   RateLimit jpeg_;
   RateLimit cloud_;
   RateLimit pose_;
+  RateLimit recognition_;
   bool events_ = true;
   bool unlimited_ = false;     ///< One part at least comes with every frame that `every_` leaves.
   std::uint64_t offered_ = 0;  ///< Frames of the pipeline, for `every_`.

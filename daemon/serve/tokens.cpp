@@ -2,14 +2,13 @@
 
 #include <fmt/format.h>
 #include <openssl/crypto.h>
-#include <openssl/sha.h>
 
 #include <algorithm>
 #include <array>
 #include <stdexcept>
 #include <utility>
 
-#include "proto/defaults.hpp"
+#include "proto/fingerprint.hpp"
 
 namespace dtact::net {
 namespace {
@@ -41,21 +40,27 @@ bool is_printable(std::string_view word) {
   return std::all_of(word.begin(), word.end(), [](char c) { return c > ' ' && c < 0x7f; });
 }
 
+constexpr std::string_view kHash = "sha256:";
+
 /// What is wrong with a line of these words; empty: nothing.
 std::string wrong_with(const std::vector<std::string_view>& words) {
   if (words.size() < 2 || words.size() > 3 || !rights_of(words[0])) {
-    return "a line is \"view TOKEN NAME\", \"control TOKEN NAME\" or \"calibrate TOKEN NAME\", the "
-           "name may be left out: dtactctl token --new view prints one";
+    return "a line is \"view HASH NAME\", \"control HASH NAME\" or \"calibrate HASH NAME\", the "
+           "name may be left out: dtactctl token --new view -o FILE prints one";
   }
   if (!std::all_of(words.begin(), words.end(), is_printable)) {
     return "only printable ASCII characters are allowed";
   }
-  const std::size_t size = words[1].size();
-  if (size < Tokens::kMinBytes || size > wire::kMaxToken) {
+  if (!words[1].starts_with(kHash)) {
     return fmt::format(
-        "the token has {} bytes, allowed are {} to {}: dtactctl token --new {} "
-        "prints one",
-        size, Tokens::kMinBytes, wire::kMaxToken, words[0]);
+        "a token itself must not be kept here, only its hash: with the token in FILE, "
+        "dtactctl token --hash {} --token-file FILE prints the line",
+        words[0]);
+  }
+  const std::string_view digits = words[1].substr(kHash.size());
+  if (digits.size() != 64 ||
+      digits.find_first_not_of("0123456789abcdef") != std::string_view::npos) {
+    return fmt::format("\"{}\" is not followed by 64 hexadecimal digits in lower case", kHash);
   }
   return {};
 }
@@ -72,41 +77,36 @@ Tokens::Tokens(std::string_view text, const std::string& file) {
     Grant grant;
     if (wrong.empty()) {
       grant = {*rights_of(words[0]), std::string(words.size() == 3 ? words[2] : std::string_view()),
-               digest_of(words[1])};
-      if (grant_of(*grant.digest) != nullptr) wrong = "the same token stands on a line above";
+               std::string(words[1])};
+      if (grant_of(grant.hash) != nullptr) wrong = "the same token stands on a line above";
     }
     if (!wrong.empty()) throw std::runtime_error(fmt::format("{}:{}: {}", file, line, wrong));
     grants_.push_back(std::move(grant));
   }
   if (grants_.empty()) {
     throw std::runtime_error(fmt::format(
-        "{}: holds no token, so that nobody could connect: dtactctl token --new control prints one",
+        "{}: holds no token's hash, so that nobody could connect: dtactctl token --new control "
+        "-o FILE prints one",
         file));
   }
 }
 
 std::optional<Tokens::Grant> Tokens::find(std::string_view token) const {
-  const Grant* grant = grant_of(digest_of(token));
+  const Grant* grant = grant_of(wire::token_hash(token));
   if (grant == nullptr) return std::nullopt;
   return *grant;
 }
 
 bool Tokens::holds(const Grant& grant) const {
-  const Grant* now = grant.digest ? grant_of(*grant.digest) : nullptr;
+  const Grant* now = grant.hash.empty() ? nullptr : grant_of(grant.hash);
   return now != nullptr && now->rights == grant.rights;
 }
 
-Tokens::Digest Tokens::digest_of(std::string_view token) {
-  Digest digest;
-  ::SHA256(reinterpret_cast<const unsigned char*>(token.data()), token.size(), digest.data());
-  return digest;
-}
-
-const Tokens::Grant* Tokens::grant_of(const Digest& digest) const {
+const Tokens::Grant* Tokens::grant_of(std::string_view hash) const {
   const Grant* found = nullptr;
-  // Compares all of them, so that the time does not reveal which one matched.
+  // All have one length. Compares all of them, so that the time does not reveal which one matched.
   for (const Grant& grant : grants_) {
-    if (::CRYPTO_memcmp(grant.digest->data(), digest.data(), digest.size()) == 0) found = &grant;
+    if (::CRYPTO_memcmp(grant.hash.data(), hash.data(), hash.size()) == 0) found = &grant;
   }
   return found;
 }

@@ -1,7 +1,5 @@
 #pragma once
 
-#include <array>
-#include <cstddef>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -11,20 +9,17 @@
 
 namespace dtact::net {
 
-/// Who may come in, by the token in Hello. Keeps digests, not the tokens.
+/// Who may come in, by the token in Hello. Neither the file nor this class has the tokens, only
+/// their hashes (wire::token_hash()).
 class Tokens {
  public:
-  /// Shorter ones can be guessed.
-  static constexpr std::size_t kMinBytes = 16;
-
-  using Digest = std::array<unsigned char, 32>;
   struct Grant {
     Rights rights = Rights::view;
-    std::string name;              ///< What the file calls it, for the log; may be empty.
-    std::optional<Digest> digest;  ///< Nothing: the client needed no token.
+    std::string name;  ///< What the file calls it, for the log; may be empty.
+    std::string hash;  ///< Empty: the client needed no token.
   };
 
-  /// A line for each token: the rights ("view", "control", "calibrate"), the token, and a name or
+  /// A line for each token: the rights ("view", "control", "calibrate"), the hash, and a name or
   /// not; printable ASCII, separated by spaces. Empty lines and lines that begin with '#' are
   /// skipped. `file` names the text in errors. Throws std::runtime_error with file, line and fix,
   /// never with a token; a text without any token is an error, too.
@@ -36,8 +31,7 @@ class Tokens {
   [[nodiscard]] bool holds(const Grant& grant) const;
 
  private:
-  static Digest digest_of(std::string_view token);
-  [[nodiscard]] const Grant* grant_of(const Digest& digest) const;
+  [[nodiscard]] const Grant* grant_of(std::string_view hash) const;
 
   std::vector<Grant> grants_;
 };

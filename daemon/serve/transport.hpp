@@ -40,6 +40,8 @@ class Transport {
   Transport& operator=(const Transport&) = delete;
   virtual ~Transport() = default;
 
+  /// The peer has said Hello, with a right token where one is needed.
+  virtual void on_authenticated() {}
   /// Before anything else.
   virtual void handshake(std::function<void(const boost::system::error_code&)> done) = 0;
   /// At least one byte, or an error; asio::error::eof when the peer sends nothing more.

@@ -56,8 +56,10 @@ void write_file_atomically(const std::filesystem::path& path, std::string_view c
 }
 
 std::string read_file(const std::filesystem::path& path, std::size_t limit) {
-  const UniqueFd fd(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
-  if (!fd) fail(errno, "cannot read", path);
+  // A pipe that nobody writes into is empty, instead of being waited for; one with a writer is
+  // read.
+  const UniqueFd fd(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
+  if (!fd || ::fcntl(fd.get(), F_SETFL, 0) != 0) fail(errno, "cannot read", path);
   std::string content;
   char buffer[65536];
   for (;;) {

@@ -164,6 +164,13 @@ void demote_at_rttime_limit() noexcept {
 
 bool was_demoted() noexcept { return demoted != 0; }
 
+std::string demoted_sentence(const std::string& name) {
+  return fmt::format(
+      "thread {} had more work than time and lost its real-time priority: give it less, a restart "
+      "gives the priority back",
+      name);
+}
+
 std::optional<std::string> lock_memory() {
   // ONFAULT: pages are locked at first access, so unused reserve costs nothing.
   if (::mlockall(MCL_CURRENT | MCL_FUTURE | MCL_ONFAULT) == 0) return std::nullopt;

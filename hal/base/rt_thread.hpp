@@ -64,6 +64,8 @@ void run_unpinned(const cpu_set_t& cpus, const std::function<void()>& body);
 void demote_at_rttime_limit() noexcept;
 /// That has happened to the calling thread.
 [[nodiscard]] bool was_demoted() noexcept;
+/// The sentence that reports it of the thread that is called `name`, with the fix.
+[[nodiscard]] std::string demoted_sentence(const std::string& name);
 
 /// Locks the process's memory page by page at first access (MCL_CURRENT | MCL_FUTURE |
 /// MCL_ONFAULT). Returns the reason for a failure with its fix, or nothing.

@@ -316,9 +316,8 @@ std::string Reader::damage() const {
     add(fmt::format("{} message(s) cannot be read, the first because of {}", messages.count,
                     messages.first));
   }
-  if (impl_->missing > 0) {
-    add(fmt::format("{} of {} messages are not there", impl_->missing,
-                    impl_->statistics->messages));
+  if (const auto& statistics = impl_->statistics; statistics && impl_->missing > 0) {
+    add(fmt::format("{} of {} messages are not there", impl_->missing, statistics->messages));
   }
   return text;
 }

@@ -191,7 +191,7 @@ std::string Writer::Impl::end() const {
 Writer::Writer(Sink& sink, const WriterOptions& options)
     : impl_(std::make_unique<Impl>(sink, options)) {
   std::string fields;
-  put_string(fields, "");  // no profile
+  put_string(fields, options.profile);
   put_string(fields, options.library);
   std::string begin(kMagic);
   put_record(begin, Op::header, fields);

@@ -15,6 +15,7 @@ namespace dtact::mcap {
 
 struct WriterOptions {
   std::string library = "dtact";        ///< Who wrote the file.
+  std::string profile{};                ///< Names what readers may expect of it: "ros2".
   std::size_t chunk_bytes = 4U << 20U;  ///< An open chunk this large is written.
   int level = 1;                        ///< zstd's.
 };

@@ -54,7 +54,7 @@ live::Opener opener(const CameraConfig& config) {
     // Nothing of the camera stays here: the session gives it back before the manager ends.
     const auto session = std::make_shared<Session>(std::move(manager), std::move(camera), config,
                                                    lock, cached ? nullptr : heap.get());
-    return {session, id, session->pixel_format(), session->controls()};
+    return {session, id, session->pixel_format(), session->controls(), session->settings()};
   };
 }
 

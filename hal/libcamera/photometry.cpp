@@ -221,6 +221,50 @@ PhotometricLock::RequestedControls PhotometricLock::requested_controls(
   return requested_controls;
 }
 
+CameraSettings PhotometricLock::settings(const lc::ControlInfoMap& offered,
+                                         const std::vector<CameraControl>& controls) const {
+  const auto setting = [&](const char* name, double maximum) -> std::optional<CameraSetting> {
+    const auto now = std::ranges::find(controls, name, &CameraControl::name);
+    if (offered.empty() || now == controls.end()) return std::nullopt;
+    const auto info = offered.find(find(name)->id.id());
+    if (info == offered.end()) return std::nullopt;
+    const double most = number(info->second.max()).value_or(0);
+    return CameraSetting{0, number(info->second.min()).value_or(0),
+                         most > 0 ? std::min(most, maximum) : maximum};
+  };
+  constexpr double kMaxGain = 1000;  // where the camera names none
+  CameraSettings settings{setting(kExposure, kMaxFrameShare * 1e6 / fps_),
+                          setting(kGain, kMaxGain)};
+  read_back(controls, settings);
+  return settings;
+}
+
+void PhotometricLock::read_back(const std::vector<CameraControl>& controls,
+                                CameraSettings& settings) {
+  for (const CameraControl& control : controls) {
+    const auto value = static_cast<double>(control.value);
+    if (control.name == kExposure && settings.exposure_us) settings.exposure_us->value = value;
+    if (control.name == kGain && settings.gain) settings.gain->value = value / 1000;
+  }
+}
+
+lc::ControlList PhotometricLock::changed_controls(const CameraChange& change,
+                                                  std::vector<CameraControl>& controls) {
+  lc::ControlList list(lc::controls::controls);
+  const auto set_one = [&](const char* name, const std::optional<double>& value) {
+    if (!value) return;
+    const lc::ControlId& id = find(name)->id;
+    list.set(id.id(), value_of(id.type(), *value));
+    const auto entry = std::ranges::find(controls, name, &CameraControl::name);
+    if (entry == controls.end()) return;
+    entry->value = report_value(id, *value);
+    entry->verdict = ControlVerdict::accepted;
+  };
+  set_one(kExposure, change.exposure_us);
+  set_one(kGain, change.gain);
+  return list;
+}
+
 void PhotometricLock::read(const lc::ControlList& metadata, Readings& readings) {
   const auto note = [&](const lc::ControlId& id) {
     if (!metadata.contains(id.id())) return;

@@ -33,6 +33,16 @@ class PhotometricLock {
   [[nodiscard]] RequestedControls requested_controls(
       const libcamera::ControlInfoMap& offered) const;
 
+  /// Exposure and gain, as far as the camera has them and `controls` says their values.
+  [[nodiscard]] CameraSettings settings(const libcamera::ControlInfoMap& offered,
+                                        const std::vector<CameraControl>& controls) const;
+  /// What to hand to the camera for `change`. `controls` get the values asked for.
+  [[nodiscard]] static libcamera::ControlList changed_controls(
+      const CameraChange& change, std::vector<CameraControl>& controls);
+
+  /// Renews the values of `settings` from `controls`.
+  static void read_back(const std::vector<CameraControl>& controls, CameraSettings& settings);
+
   /// The readings of the controls that matter, out of a frame's metadata.
   static void read(const libcamera::ControlList& metadata, Readings& readings);
 

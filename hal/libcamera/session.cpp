@@ -11,6 +11,7 @@
 #include <cstring>
 #include <iterator>
 #include <system_error>
+#include <thread>
 #include <utility>
 
 #include "hal/base/clock.hpp"
@@ -87,14 +88,16 @@ Session::Session(std::unique_ptr<Manager> manager, std::shared_ptr<lc::Camera> c
                  const CameraConfig& config, const PhotometricLock& lock, const DmaHeap* heap)
     : manager_(std::move(manager)),
       camera_(std::move(camera)),
-      sensor_(sensor_of(camera_->properties())) {
+      sensor_(sensor_of(camera_->properties())),
+      fps_(config.fps) {
   if (const int e = camera_->acquire(); e != 0) fail(e, "acquire", camera_->id());
   acquired_ = true;
   try {
     configure(config);
     make_requests(heap);
     start(lock);
-    settle(config.fps);
+    settle();
+    settings_ = lock.settings(camera_->controls(), controls_);
   } catch (...) {
     stop();
     throw;
@@ -216,13 +219,13 @@ void Session::start(const PhotometricLock& lock) {
   }
 }
 
-void Session::settle(double fps) {
+void Session::settle() {
   // Now, since the controls are compared with a calibration's, which has what became of them, when
   // the camera has been opened, and only then.
   // This may be the capture thread, for which the watchdog waits ten seconds.
   constexpr double kMaxNs = 4e9;
   const auto timeout =
-      static_cast<std::int64_t>(std::min(kMaxNs, 1e9 + kSettlingFrames * 1e9 / fps));
+      static_cast<std::int64_t>(std::min(kMaxNs, 1e9 + kSettlingFrames * 1e9 / fps_));
   const bool said =
       skip_frames(*this, kSettlingFrames, base::system_clock().monotonic_ns() + timeout,
                   [this] { return !readings_.empty(); });
@@ -320,6 +323,13 @@ bool Session::enqueue(int index) noexcept {
   const Slot& slot = slots_[static_cast<std::size_t>(index)];
   (void)sync_for_reading(slot.fd, false);
   slot.request->reuse(lc::Request::ReuseBuffers);
+  {
+    const std::unique_lock guard(readings_mutex_, std::try_to_lock);
+    if (guard && changed_controls_) {
+      slot.request->controls().merge(*changed_controls_);
+      changed_controls_.reset();
+    }
+  }
   const bool taken = camera_->queueRequest(slot.request.get()) == 0;
   if (taken) ++queued_;
   return taken;
@@ -332,6 +342,20 @@ std::string Session::check_controls(std::vector<CameraControl>& controls) {
     readings = readings_;
   }
   return PhotometricLock::compare(readings, controls);
+}
+
+void Session::change(const CameraChange& change, std::vector<CameraControl>& controls,
+                     CameraSettings& settings) {
+  {
+    const std::lock_guard guard(readings_mutex_);
+    changed_controls_ = PhotometricLock::changed_controls(change, controls);
+  }
+  // The frames say what has become of it, once those that were under way have passed.
+  constexpr double kMaxSeconds = 4;
+  std::this_thread::sleep_for(
+      std::chrono::duration<double>(std::min(kMaxSeconds, kSettlingFrames / fps_)));
+  (void)check_controls(controls);
+  PhotometricLock::read_back(controls, settings);
 }
 
 }  // namespace dtact::hal::libcamera_backend

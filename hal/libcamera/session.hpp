@@ -8,6 +8,7 @@
 #include <condition_variable>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -42,6 +43,9 @@ class Session final : public live::Source {
   [[nodiscard]] bool enqueue(int index) noexcept override;
   void stop() noexcept override;
   [[nodiscard]] std::string check_controls(std::vector<CameraControl>& controls) override;
+  void change(const CameraChange& change, std::vector<CameraControl>& controls,
+              CameraSettings& settings) override;
+  [[nodiscard]] const CameraSettings& settings() const noexcept { return settings_; }
 
  private:
   /// A request for life, with its buffer's memory.
@@ -61,7 +65,7 @@ class Session final : public live::Source {
   void add_slot(libcamera::FrameBuffer& buffer);
   void start(const PhotometricLock& lock);
   /// Passes over the first frames, and notes in the controls what the last of them says.
-  void settle(double fps);
+  void settle();
   void on_completed(libcamera::Request* request);
   void on_disconnected();
 
@@ -73,6 +77,8 @@ class Session final : public live::Source {
   live::Format format_;
   std::string pixel_format_;
   std::vector<CameraControl> controls_;
+  CameraSettings settings_;
+  double fps_;
   std::vector<std::unique_ptr<libcamera::FrameBuffer>> own_buffers_;  // those from the heap
   std::vector<Slot> slots_;
   std::atomic<int> queued_{0};  // a frame may be released on another thread
@@ -85,9 +91,10 @@ class Session final : public live::Source {
   std::size_t completed_count_ = 0;
   bool gone_ = false;
 
-  // Shared with the watching thread.
+  // Shared with the threads that watch and change controls.
   std::mutex readings_mutex_;
   Readings readings_;
+  std::optional<libcamera::ControlList> changed_controls_;  // for the next request
 };
 
 }  // namespace dtact::hal::libcamera_backend

@@ -34,6 +34,23 @@ std::uint64_t get(const std::atomic<std::uint64_t>& counter) noexcept {
   return counter.load(std::memory_order_relaxed);
 }
 
+bool fits(const std::optional<double>& value, const std::optional<CameraSetting>& setting) {
+  return value && setting && *value >= setting->minimum && *value <= setting->maximum;
+}
+
+/// What was changed of the camera before. Another one may lack it: then its own values stay, which
+/// its controls say.
+void change_again(CameraChange change, Opened& opened) {
+  if (!fits(change.exposure_us, opened.settings.exposure_us)) change.exposure_us.reset();
+  if (!fits(change.gain, opened.settings.gain)) change.gain.reset();
+  if (!change.exposure_us && !change.gain) return;
+  try {
+    opened.source->change(change, opened.controls, opened.settings);
+  } catch (const std::runtime_error&) {  // NOLINT(bugprone-empty-catch)
+    // As above.
+  }
+}
+
 }  // namespace
 
 LiveCamera::LiveCamera(const CameraConfig& config, const std::string& backend,
@@ -99,7 +116,15 @@ void LiveCamera::connect() {
   // The capture thread is real-time and pinned; threads that the driver's library starts must not
   // be.
   Opened opened;
-  base::run_unpinned(cpus_, [&] { opened = open_(); });
+  CameraChange changed;
+  {
+    const std::lock_guard guard(mutex_);
+    changed = changed_;
+  }
+  base::run_unpinned(cpus_, [&] {
+    opened = open_();
+    change_again(changed, opened);
+  });
   auto fresh = std::make_shared<Connection>(opened.source);
   if (area_) fresh->decoder.will_read(*area_);
   opened_ns_ = now_ns();
@@ -114,6 +139,7 @@ void LiveCamera::connect() {
   info_.identity = std::move(opened.identity);
   info_.pixel_format = std::move(opened.pixel_format);
   info_.controls = std::move(opened.controls);
+  info_.settings = opened.settings;
   fix_ = "the camera has been opened; its first frame is awaited";
   leases_.use(opened.source);
   connection_ = std::move(fresh);
@@ -360,9 +386,31 @@ void LiveCamera::note_silence(std::int64_t now) noexcept {
   next_try_ns_ = now;
 }
 
+void LiveCamera::change(const CameraChange& change) {
+  const std::lock_guard controls_guard(controls_mutex_);
+  std::unique_lock guard(mutex_);
+  std::shared_ptr<Connection> held = connection_;
+  if (!held) throw DeviceError(state_.load(), fix_);
+  std::vector<CameraControl> controls = info_.controls;
+  CameraSettings settings = info_.settings;
+  guard.unlock();
+  held->source->change(change, controls, settings);
+  const Connection* changed = held.get();
+  held.reset();  // may close the device: not under the mutex
+  guard.lock();
+  if (change.exposure_us) changed_.exposure_us = change.exposure_us;
+  if (change.gain) changed_.gain = change.gain;
+  if (changed != connection_.get()) return;
+  info_.controls = std::move(controls);
+  info_.settings = settings;
+}
+
 void LiveCamera::watch_controls() noexcept {
   std::unique_lock guard(mutex_);
   while (!wake_watcher_.wait_for(guard, kWatchPeriod, [this] { return stopping_; })) {
+    guard.unlock();
+    const std::lock_guard controls_guard(controls_mutex_);
+    guard.lock();
     std::shared_ptr<Connection> held = connection_;
     if (!held) continue;
     try {

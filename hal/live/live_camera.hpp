@@ -40,6 +40,7 @@ class LiveCamera : public Camera {
   /// forbidden is a state of the report, since it may come back.
   void start() override;
   void will_read(const Area& area) noexcept override;
+  void change(const CameraChange& change) override;
   [[nodiscard]] GrabStatus grab(Frame& out, std::chrono::nanoseconds timeout) noexcept override;
 
  private:
@@ -89,6 +90,8 @@ class LiveCamera : public Camera {
   bool after_gap_ = false;
   bool reopened_ = false;
 
+  // Held while controls are read or changed: what a client changes is not a control that moved.
+  std::mutex controls_mutex_;  // before mutex_
   // Shared. The mutex is held for copies only, never during a system call.
   mutable std::mutex mutex_;
   std::condition_variable wake_watcher_;
@@ -96,6 +99,7 @@ class LiveCamera : public Camera {
   CameraInfo info_;
   std::string fix_;
   std::string moved_;
+  CameraChange changed_;  // since the start; what a camera that comes back gets
   bool stopping_ = false;
   std::atomic<CameraState> state_{CameraState::unplugged};
   std::atomic<bool> controls_moved_{false};

@@ -80,6 +80,11 @@ class Source {
   /// Reads the locked ones of `controls` again and sets back what has moved. Returns the sentence
   /// that says what moved; empty when nothing did. Called on another thread than the rest.
   [[nodiscard]] virtual std::string check_controls(std::vector<CameraControl>& controls) = 0;
+  /// Changes settings that Opened has, within their ranges, and what `controls` and `settings` say
+  /// of them. On any thread but the capture thread, never beside check_controls(). Throws
+  /// std::runtime_error when the camera refuses.
+  virtual void change(const CameraChange& /*change*/, std::vector<CameraControl>& /*controls*/,
+                      CameraSettings& /*settings*/) {}
 };
 
 /// A device that has been opened and streams.
@@ -88,6 +93,7 @@ struct Opened {
   std::string identity;      ///< as in CameraInfo
   std::string pixel_format;  ///< as in CameraInfo
   std::vector<CameraControl> controls;
+  CameraSettings settings = {};
 };
 
 /// Opens the configured device and starts it. Throws DeviceError.

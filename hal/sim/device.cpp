@@ -120,7 +120,8 @@ void Device::cover(int rows) noexcept {
 void Device::regulate(bool automatic) noexcept {
   if (!automatic) {
     kept_grey_ = 0;
-    renderer_.set_gain(gain_ = 1);
+    gain_ = 1;
+    renderer_.set_gain(brightness_);
     return;
   }
   constexpr int kRowStep = 8;       // of the rows that it measures
@@ -134,7 +135,7 @@ void Device::regulate(bool automatic) noexcept {
   const double grey = std::max(1.0, static_cast<double>(sum) / rows / image.width);
   if (kept_grey_ == 0) kept_grey_ = grey;
   gain_ = std::clamp(gain_ * (1 + kAFrame * (kept_grey_ / grey - 1)), 0.25, 4.0);
-  renderer_.set_gain(gain_);
+  renderer_.set_gain(brightness_ * gain_);
 }
 
 LedLevels Device::exposed_light() noexcept {

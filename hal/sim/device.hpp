@@ -51,6 +51,8 @@ class Device {
   /// The scene has a driver's call hang now.
   [[nodiscard]] bool hangs() const noexcept { return hangs_; }
   [[nodiscard]] std::uint64_t disconnects() const noexcept { return disconnects_; }
+  /// Multiplies the scene's exposure, from the frame after the next one on. Any thread.
+  void set_brightness(double factor) noexcept { brightness_ = factor; }
   [[nodiscard]] const Scene& scene() const noexcept { return renderer_.truth().scene(); }
 
  private:
@@ -70,7 +72,8 @@ class Device {
   std::shared_ptr<LightLink> link_;
   base::Clock& clock_;
   luma::LumaBuffer image_;
-  double gain_ = 1;              // of an exposure that runs automatically
+  double gain_ = 1;  // of an exposure that runs automatically
+  std::atomic<double> brightness_{1};
   double kept_grey_ = 0;         // the mean that it keeps; 0: it does not
   std::vector<LedLevels> seen_;  // [0] what the ring shows now, [1] a frame ago, ...
 

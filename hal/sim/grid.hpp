@@ -31,6 +31,29 @@ struct Grid {
 /// plane in its apex.
 [[nodiscard]] Place pixel_place(const CameraModel& camera, double column, double row) noexcept;
 
+/// What the camera sees of a deformed gel, on the grid: at each point the gel that appears where
+/// the undeformed gel's point does. One thread at a time.
+class Perspective {
+ public:
+  Perspective(const SurfaceModel& surface, const Grid& grid);
+
+  /// Finds the rays' places on a gel of this indentation (grid sized, `per_mm` units a millimetre).
+  void follow(std::span<const std::int16_t> indentation, double per_mm) noexcept;
+  /// Reads grid-sized values at those places.
+  void read(std::span<const std::int16_t> values, std::span<std::int16_t> out) const noexcept;
+
+ private:
+  struct Place {
+    float column = 0;
+    float row = 0;
+  };
+  [[nodiscard]] std::size_t corner(float& column, float& row) const noexcept;
+
+  Grid grid_;
+  std::vector<Place> leans_;  // grid points by which a ray moves for each millimetre of depth
+  std::vector<Place> seen_;   // of each point, grid points
+};
+
 /// For every pixel the four grid points around the place that it shows. Bilinear, in Q8.
 class PixelMap {
  public:

@@ -20,11 +20,13 @@ Renderer::Renderer(const Scene& scene, std::uint64_t seed)
 
 Renderer::Renderer(std::shared_ptr<const Truth> truth, const Scene& scene, std::uint64_t seed)
     : truth_(std::move(truth)),
+      perspective_(scene.surface, truth_->grid()),
       optics_(scene.optics, truth_->grid(), scene.gel),
       field_(scene),
       noise_(seed, scene.camera.read_noise, scene.camera.shot_noise),
       indentation_(truth_->grid().size()),
       loss_(truth_->grid().size()),
+      seen_loss_(truth_->grid().size()),
       loss_row_(static_cast<std::size_t>(scene.camera.width)),
       light_(pixel_count(scene.camera)),
       grey_(light_.size()),
@@ -51,6 +53,8 @@ void Renderer::update(std::uint64_t sequence, const LedLevels& light, int rows) 
     moment_ = now;
     truth_->blend(now, indentation_);
     optics_.run(indentation_, loss_);
+    perspective_.follow(indentation_, Truth::kPerMm);
+    perspective_.read(loss_, seen_loss_);
     exposed_rows_ = 0;
   }
   expose(rows);
@@ -76,7 +80,7 @@ void Renderer::render(std::uint64_t sequence, const LedLevels& light, std::uint8
 void Renderer::expose(int rows) noexcept {
   const std::size_t width = loss_row_.size();
   for (int y = exposed_rows_; y < rows; ++y) {
-    truth_->pixels().sample_row(y, loss_, loss_row_);
+    truth_->pixels().sample_row(y, seen_loss_, loss_row_);
     const std::size_t begin = static_cast<std::size_t>(y) * width;
     const std::uint16_t* const light = light_.data() + begin;
     std::uint16_t* const grey = grey_.data() + begin;

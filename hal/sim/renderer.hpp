@@ -43,6 +43,7 @@ class Renderer {
   void expose(int rows) noexcept;
 
   std::shared_ptr<const Truth> truth_;
+  Perspective perspective_;
   Optics optics_;
   LightField field_;
   Noise noise_;
@@ -55,6 +56,7 @@ class Renderer {
   int exposed_rows_ = 0;  // rows of grey_ that are up to date
   std::vector<std::int16_t> indentation_;
   std::vector<std::int16_t> loss_;
+  std::vector<std::int16_t> seen_loss_;
   std::vector<std::int16_t> loss_row_;
   std::vector<std::uint16_t> light_;
   std::vector<std::uint16_t> grey_;  // the image without noise, Q6

@@ -201,6 +201,8 @@ void read_surface(KeyReader table, SurfaceModel& surface) {
     table.require("camera_mm");
     surface.radius_mm = table.number("radius_mm", 5, 500);
     surface.camera_mm = table.number("camera_mm", 1, surface.radius_mm);
+  } else {
+    table.number_if("camera_mm", surface.camera_mm, 0, 1000);
   }
   table.finish();
 }

@@ -21,6 +21,13 @@ namespace {
 /// How often a call that the scene has hang looks whether it may return.
 constexpr std::int64_t kHangStep = 5'000'000;
 
+/// A camera of the simulation exposes for this long where a scene says 1; the gain beside it and
+/// the range are such that the product stays within what the renderer does.
+constexpr double kExposureUs = 10'000;
+constexpr double kMinExposure = 0.25;
+constexpr double kMaxExposure = 2;
+constexpr double kMaxGain = 2;
+
 Scene configured_scene(const CameraConfig& config) {
   const Scene scene = config.sim.scene.empty() ? default_scene() : load_scene(config.sim.scene);
   return at_mode(scene, config.width, config.height, config.fps);
@@ -74,7 +81,9 @@ class SimCamera::Impl {
   std::uint64_t next_sequence = 0;
   std::uint64_t lost_seen = 0;
   std::uint64_t disconnects_seen = 0;
-  // Values that report() returns to any thread.
+  // Values that info() and report() return to any thread.
+  std::atomic<double> exposure{1};  // beside the scene's
+  std::atomic<double> gain{1};
   std::atomic<std::uint64_t> delivered{0};
   std::atomic<std::uint64_t> lost{0};
   std::atomic<std::uint64_t> skipped{0};
@@ -169,8 +178,14 @@ CameraInfo SimCamera::info() const {
   info.height = scene.camera.height;
   info.fps = scene.camera.fps;
   info.light_delay_frames = scene.camera.light_delay_frames;
-  info.controls = {control("exposure_permille", scene.camera.exposure),
+  // The exposure as its effect, the gain included.
+  const double exposure = impl_->exposure;
+  const double gain = impl_->gain;
+  info.controls = {control("exposure_permille", scene.camera.exposure * exposure * gain),
                    control("gamma_permille", scene.camera.gamma)};
+  const double us = kExposureUs * scene.camera.exposure;
+  info.settings = {.exposure_us = {{us * exposure, us * kMinExposure, us * kMaxExposure}},
+                   .gain = {{gain, 1, kMaxGain}}};
   return info;
 }
 
@@ -196,6 +211,14 @@ CameraReport SimCamera::report() const {
 
 void SimCamera::start() {
   if (impl_->paced) impl_->device.run_paced();
+}
+
+void SimCamera::change(const CameraChange& change) {
+  if (change.exposure_us) {
+    impl_->exposure = *change.exposure_us / kExposureUs / impl_->device.scene().camera.exposure;
+  }
+  if (change.gain) impl_->gain = *change.gain;
+  impl_->device.set_brightness(impl_->exposure * impl_->gain);
 }
 
 void SimCamera::will_read(const Area& area) noexcept {

@@ -28,6 +28,7 @@ class SimCamera final : public Camera, private FrameOwner {
   [[nodiscard]] CameraInfo info() const override;
   [[nodiscard]] CameraReport report() const override;
   void start() override;
+  void change(const CameraChange& change) override;
   void will_read(const Area& area) noexcept override;
   [[nodiscard]] GrabStatus grab(Frame& out, std::chrono::nanoseconds timeout) noexcept override;
 

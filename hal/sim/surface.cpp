@@ -19,22 +19,25 @@ double units_to_circle(double radius, double from_centre, double across, double 
 
 }  // namespace
 
-Place unrolled(const SurfaceModel& surface, const Place& seen) noexcept {
+Place unrolled(const SurfaceModel& surface, const Place& seen, double depth_mm) noexcept {
   const double radius = surface.radius_mm;
   const double camera = surface.camera_mm;
   const double from_centre = radius - camera;
+  const double pressed = radius - depth_mm;
   switch (surface.shape) {
-    case SurfaceShape::plane:
-      break;
+    case SurfaceShape::plane: {
+      const double rest = camera > 0 ? 1 - depth_mm / camera : 1;
+      return {rest * seen.x_mm, rest * seen.y_mm};
+    }
     case SurfaceShape::sphere: {
       const double across = std::hypot(seen.x_mm, seen.y_mm);
       if (across == 0) break;
-      const double t = units_to_circle(radius, from_centre, across, camera);
+      const double t = units_to_circle(pressed, from_centre, across, camera);
       const double arc = radius * std::atan2(t * across, from_centre + t * camera);
       return {seen.x_mm * arc / across, seen.y_mm * arc / across};
     }
     case SurfaceShape::cylinder: {
-      const double t = units_to_circle(radius, from_centre, seen.y_mm, camera);
+      const double t = units_to_circle(pressed, from_centre, seen.y_mm, camera);
       return {t * seen.x_mm, radius * std::atan2(t * seen.y_mm, from_centre + t * camera)};
     }
   }

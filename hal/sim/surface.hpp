@@ -14,7 +14,9 @@ enum class SurfaceShape : std::uint8_t { plane, sphere, cylinder };
 struct SurfaceModel {
   SurfaceShape shape = SurfaceShape::plane;
   double radius_mm = 0;
-  double camera_mm = 0;  ///< How far behind the apex the camera's rays start, at most the radius.
+  /// How far behind the apex the camera's rays start: of a curved one at most the radius, of a
+  /// plane 0 for rays that are all along z.
+  double camera_mm = 0;
 };
 
 /// A place on the gel, mm from the image's centre: x to the right and y down on a plane. On a
@@ -35,9 +37,10 @@ struct SurfacePoint {
 };
 
 /// Intersection of the surface with the straight line from the camera through `seen`, a position
-/// on the tangent plane in the apex. It needs no refraction: camera_mm is where rays
-/// seem to start inside the gel.
-[[nodiscard]] Place unrolled(const SurfaceModel& surface, const Place& seen) noexcept;
+/// on the tangent plane in the apex, where it is pressed in by `depth_mm` along its normals. It
+/// needs no refraction: camera_mm is where rays seem to start inside the gel.
+[[nodiscard]] Place unrolled(const SurfaceModel& surface, const Place& seen,
+                             double depth_mm = 0) noexcept;
 
 [[nodiscard]] SurfacePoint point_at(const SurfaceModel& surface, const Place& place);
 

@@ -199,31 +199,38 @@ void Truth::blend(const Moment& moment, std::span<std::int16_t> out) const noexc
   }
 }
 
+/// Calls `each` with the value that every pixel of the camera sees, row by row; clears `out`
+/// before.
+template <typename Each, typename Out>
+void Truth::see(std::span<const std::int16_t> indentation, std::span<const std::int16_t> values,
+                const Each& each, Out& out) const {
+  Perspective perspective(scene_.surface, grid_);
+  perspective.follow(indentation, kPerMm);
+  std::vector<std::int16_t> seen(grid_.size());
+  perspective.read(values, seen);
+  std::vector<std::int16_t> row(static_cast<std::size_t>(scene_.camera.width));
+  out.clear();
+  out.reserve(row.size() * static_cast<std::size_t>(scene_.camera.height));
+  for (int y = 0; y < scene_.camera.height; ++y) {
+    pixels_.sample_row(y, seen, row);
+    std::ranges::for_each(row, each);
+  }
+}
+
 void Truth::indentation_mm(std::uint64_t sequence, std::vector<float>& out) const {
   std::vector<std::int16_t> map(grid_.size());
   blend(moment(sequence), map);
-  const auto width = static_cast<std::size_t>(scene_.camera.width);
-  std::vector<std::int16_t> row(width);
-  out.resize(width * static_cast<std::size_t>(scene_.camera.height));
-  for (int y = 0; y < scene_.camera.height; ++y) {
-    pixels_.sample_row(y, map, row);
-    std::transform(row.begin(), row.end(), out.begin() + y * static_cast<std::ptrdiff_t>(width),
-                   [](std::int16_t v) { return static_cast<float>(v) / kPerMm; });
-  }
+  see(map, map, [&out](std::int16_t v) { out.push_back(static_cast<float>(v) / kPerMm); }, out);
 }
 
 void Truth::contact(std::uint64_t sequence, std::vector<std::uint8_t>& out) const {
   const Moment at = moment(sequence);
   const int nearer = at.weight < (1 << (kBlendBits - 1)) ? at.from : at.to;
-  const auto& map = maps_[static_cast<std::size_t>(nearer)].contact;
-  const auto width = static_cast<std::size_t>(scene_.camera.width);
-  std::vector<std::int16_t> row(width);
-  out.resize(width * static_cast<std::size_t>(scene_.camera.height));
-  for (int y = 0; y < scene_.camera.height; ++y) {
-    pixels_.sample_row(y, map, row);
-    std::transform(row.begin(), row.end(), out.begin() + y * static_cast<std::ptrdiff_t>(width),
-                   [](std::int16_t v) { return static_cast<std::uint8_t>(v >= 128 ? 255 : 0); });
-  }
+  std::vector<std::int16_t> map(grid_.size());
+  blend(at, map);
+  see(
+      map, maps_[static_cast<std::size_t>(nearer)].contact,
+      [&out](std::int16_t v) { out.push_back(v >= 128 ? 255 : 0); }, out);
 }
 
 std::optional<Pose> Truth::pose(std::size_t press, std::uint64_t sequence) const {

@@ -30,8 +30,8 @@ class Truth {
   /// has no solution.
   explicit Truth(const Scene& scene);
 
-  /// Indentation at every pixel of the camera's image (distortion included), row-major, mm,
-  /// positive = pressed, negative = bulge.
+  /// Indentation of the gel's point that each pixel of the camera's image sees (distortion and
+  /// perspective included), row-major, mm, positive = pressed, negative = bulge.
   void indentation_mm(std::uint64_t sequence, std::vector<float>& out) const;
   /// 255 in contact, 0 elsewhere; from the nearer one of the two maps between which
   /// the truth is blended.
@@ -74,6 +74,9 @@ class Truth {
     int map = 0;
   };
   void solve_all();
+  template <typename Each, typename Out>
+  void see(std::span<const std::int16_t> indentation, std::span<const std::int16_t> values,
+           const Each& each, Out& out) const;
 
   Scene scene_;
   Grid grid_;

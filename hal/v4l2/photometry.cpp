@@ -28,6 +28,7 @@ struct Control {
 
 constexpr const char* kAutoExposure = "auto_exposure";
 constexpr const char* kExposure = "exposure_time_absolute";
+constexpr const char* kGain = "gain";
 /// V4L2_CID_EXPOSURE_ABSOLUTE counts in 100 µs.
 constexpr double kExposureUnitUs = 100;
 
@@ -44,7 +45,7 @@ constexpr std::array<Control, 17> kControls{{
      "the camera may keep its exposure to the mains, and the LEDs then show as bands"},
     {"backlight_compensation", V4L2_CID_BACKLIGHT_COMPENSATION, 0},
     {kExposure, V4L2_CID_EXPOSURE_ABSOLUTE, std::nullopt},
-    {"gain", V4L2_CID_GAIN, std::nullopt},
+    {kGain, V4L2_CID_GAIN, std::nullopt},
     {"white_balance_temperature", V4L2_CID_WHITE_BALANCE_TEMPERATURE, std::nullopt},
     {"focus_absolute", V4L2_CID_FOCUS_ABSOLUTE, std::nullopt},
     {"gamma", V4L2_CID_GAMMA, std::nullopt},
@@ -231,6 +232,35 @@ std::string PhotometricLock::check(int fd, std::vector<CameraControl>& controls)
     moved += ": it was set back; another program or the camera's own automatic is at work";
   }
   return moved;
+}
+
+CameraSettings PhotometricLock::settings(int fd, const std::vector<CameraControl>& controls) {
+  const auto setting = [&](const char* name, double unit) -> std::optional<CameraSetting> {
+    const auto offered = query(fd, find(name)->id);
+    const auto now = std::ranges::find(controls, name, &CameraControl::name);
+    if (!offered || now == controls.end()) return std::nullopt;
+    return CameraSetting{static_cast<double>(now->value) * unit, offered->minimum * unit,
+                         offered->maximum * unit};
+  };
+  return {setting(kExposure, kExposureUnitUs), setting(kGain, 1)};
+}
+
+void PhotometricLock::change(int fd, const CameraChange& change,
+                             std::vector<CameraControl>& controls) {
+  const auto set_one = [&](const char* name, const std::optional<double>& value, double unit) {
+    if (!value) return;
+    const auto now = std::ranges::find(controls, name, &CameraControl::name);
+    const auto offered = query(fd, find(name)->id);
+    if (!offered || now == controls.end()) {
+      throw std::runtime_error(fmt::format("this camera has no {}", name));
+    }
+    // Not the count of transfers, among which are the stream's.
+    CameraControl set = lock(fd, *find(name), *offered, std::llround(*value / unit), {}).control;
+    if (set.verdict == ControlVerdict::refused) throw std::runtime_error(set.note);
+    *now = std::move(set);
+  };
+  set_one(kExposure, change.exposure_us, kExposureUnitUs);
+  set_one(kGain, change.gain, 1);
 }
 
 }  // namespace dtact::hal::v4l2

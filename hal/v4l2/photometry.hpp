@@ -63,6 +63,11 @@ class PhotometricLock {
   /// the sentence that says what moved; empty when nothing did.
   [[nodiscard]] std::string check(int fd, std::vector<CameraControl>& controls) const;
 
+  /// Exposure and gain of the device at `fd`, as far as it has them.
+  [[nodiscard]] static CameraSettings settings(int fd, const std::vector<CameraControl>& controls);
+  /// Sets what `change` has, and its entries of `controls`. Throws std::runtime_error.
+  static void change(int fd, const CameraChange& change, std::vector<CameraControl>& controls);
+
  private:
   V4l2Config config_;
   double exposure_us_ = 0;  // 0 = the camera's default

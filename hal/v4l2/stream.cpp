@@ -247,4 +247,10 @@ std::string Stream::check_controls(std::vector<CameraControl>& controls) {
   return lock_.check(fd_.get(), controls);
 }
 
+void Stream::change(const CameraChange& change, std::vector<CameraControl>& controls,
+                    CameraSettings& settings) {
+  PhotometricLock::change(fd_.get(), change, controls);
+  settings = this->settings(controls);
+}
+
 }  // namespace dtact::hal::v4l2

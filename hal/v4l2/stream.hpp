@@ -42,6 +42,11 @@ class Stream final : public live::Source {
   [[nodiscard]] bool enqueue(int index) noexcept override;
   void stop() noexcept override;
   [[nodiscard]] std::string check_controls(std::vector<CameraControl>& controls) override;
+  void change(const CameraChange& change, std::vector<CameraControl>& controls,
+              CameraSettings& settings) override;
+  [[nodiscard]] CameraSettings settings(const std::vector<CameraControl>& controls) const {
+    return PhotometricLock::settings(fd_.get(), controls);
+  }
 
  private:
   void set_format(std::uint32_t fourcc, const CameraConfig& asked);

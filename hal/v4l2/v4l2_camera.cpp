@@ -5,6 +5,7 @@
 #include <memory>
 #include <stdexcept>
 #include <utility>
+#include <vector>
 
 #include "hal/live/search_throttle.hpp"
 #include "hal/v4l2/finder.hpp"
@@ -22,7 +23,9 @@ live::Opened open(const CameraConfig& config, const DeviceName& name, const Phot
       std::make_shared<Stream>(std::move(device.fd), device.node, fourcc, config, lock);
   stream->lock_controls();
   stream->start();
-  return {stream, device.identity, find_format(fourcc)->name, stream->lock_controls_again()};
+  std::vector<CameraControl> controls = stream->lock_controls_again();
+  const CameraSettings settings = stream->settings(controls);
+  return {stream, device.identity, find_format(fourcc)->name, std::move(controls), settings};
 }
 
 live::Opener opener(const CameraConfig& config) {

@@ -3,6 +3,7 @@
 #include "daemon/pipeline/depth_frame.hpp"
 #include "daemon/pipeline/pipeline_config.hpp"
 #include "daemon/recon/depth_sums.hpp"
+#include "daemon/recon/surface.hpp"
 
 namespace dtact::pipeline {
 
@@ -18,9 +19,10 @@ class ContactDetector {
 
   /// What one depth map of `width` × `height` pixels, `mm_per_px` millimetres each, added up to by
   /// sum_rules(). The summary is in millimetres in the surface frame: origin at the map's centre, x
-  /// right, y down. Area, centroid and volume are those of the pixels deeper than `threshold_mm`.
+  /// right, y down. Area, centroid and volume are those of the pixels deeper than `threshold_mm`,
+  /// at their true places as `view` says.
   [[nodiscard]] ContactSummary inspect(const recon::DepthSums& sums, int width, int height,
-                                       double mm_per_px) noexcept;
+                                       double mm_per_px, const recon::Viewpoint& view) noexcept;
 
   [[nodiscard]] bool in_contact() const noexcept { return in_contact_; }
 

@@ -71,7 +71,8 @@ void DepthMaker::make(const hal::LumaView& luma, const ReferenceTracker& tracker
   out.times.lut_ns = steps.lut_ns + began_ns - made_ns;
   out.contact_um = rules.threshold_um;
   out.contact_absence = ContactAbsence::none;
-  out.contact = contact_.inspect(sums, model.rectify.width, model.rectify.height, model.mm_per_px);
+  out.contact = contact_.inspect(sums, model.rectify.width, model.rectify.height, model.mm_per_px,
+                                 model.surface.view);
   const int beyond = reconstructor.beyond_pixels();
   beyond_ = beyond * out.made_decimation * out.made_decimation > config_.beyond_pixels;
   judge(tracker.trust(), bend_um(sums, model.mm_per_px) * rim_factor(sums.made, beyond), out);

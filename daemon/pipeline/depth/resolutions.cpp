@@ -93,7 +93,9 @@ void Resolutions::add(const recon::CellLattice& lattice, int decimation, int ste
   recon::TileReaders readers(lattice, of->rectify, reconstructor.radius());
   recon::TileRows tiles(static_cast<std::size_t>(readers.grid().rows()));
   std::optional<recon::ForceMeter> force;
-  if (of->force) force.emplace(*of->force, of->rectify.width, of->rectify.height, of->mm_per_px);
+  if (const auto& law = of->force) {
+    force.emplace(*law, of->rectify.width, of->rectify.height, of->mm_per_px);
+  }
   all_.push_back(
       {std::move(reconstructor), std::move(readers), std::move(tiles), {}, std::move(force)});
   if (map_decimation == decimation) return;

@@ -67,6 +67,7 @@ void ReferenceKeeper::restore(std::span<const std::uint16_t> reference_q8, bool 
   std::ranges::copy(reference_q8, good_.begin());
   measure(good_, width_, height_, good_grid_);
   have_good_ = true;
+  stored_ = true;
   good_same_light_ = same_light;
   other_light_ = !same_light;
   same_shape_ = same_shape;
@@ -168,6 +169,8 @@ ReferenceStep ReferenceKeeper::settle(const hal::LumaView& luma) noexcept {
   }
   dark_frames_ = 0;
   if (settle_.add(now_.mean) || ++waited_ > rules_.timeout_frames) {
+    // Depth need not wait for a new reference where the last run's is of the same light.
+    if (stored_ && have_good_ && good_same_light_) return use_fallback();
     start_average();
     phase_ = Phase::averaging;
   }
@@ -204,6 +207,7 @@ ReferenceStep ReferenceKeeper::take() noexcept {
   std::swap(good_, candidate_);
   good_grid_ = candidate_grid_;
   have_good_ = true;
+  stored_ = false;
   good_same_light_ = true;
   other_light_ = false;
   same_shape_ = true;

@@ -39,7 +39,7 @@ class SettleDetector {
 enum class ReferenceQuality : std::uint8_t {
   none,      ///< There is none yet: no depth.
   fresh,     ///< Averaged under the present light without contact.
-  restored,  ///< There is contact: the last good one, made under the same light.
+  restored,  ///< The last good one, made under the same light: after a start, and during contact.
   stale      ///< There is contact: an older one brought to the present light as well as it goes.
 };
 
@@ -50,8 +50,9 @@ struct ReferenceStep {
 
 /// Decides when to take the reference image and which fallback to use until then. The sequence:
 /// waits until the mean grey settles, averages, compares with an image known to be without contact,
-/// and only then takes it. While a fallback reference is in use it checks every few frames whether
-/// the contact has ended. Allocates at construction only; one thread.
+/// and only then takes it. After a start the last run's reference serves meanwhile, if it is of the
+/// same light. While a fallback reference is in use it checks every few frames whether there is no
+/// contact, and takes a new one then. Allocates at construction only; one thread.
 class ReferenceKeeper {
  public:
   ReferenceKeeper(int width, int height, const ReferenceRules& rules);
@@ -144,6 +145,7 @@ class ReferenceKeeper {
   std::vector<std::uint16_t> good_;  // the last good reference
   LumaGrid good_grid_;
   bool have_good_ = false;
+  bool stored_ = false;  // it is of an earlier run
   bool good_same_light_ = false;
   std::vector<std::uint16_t> candidate_;
   LumaGrid candidate_grid_;

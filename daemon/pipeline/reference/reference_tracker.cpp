@@ -10,9 +10,10 @@ namespace {
 /// The published method knows no gain: a light brighter or dimmer than at calibration by this share
 /// makes every depth wrong by as much.
 constexpr double kOtherLevel = 0.1;
-/// References of one light are written at most this often: clients may re-zero at any rate, and
-/// disks wear.
+/// References of one light are written at most this often, and the first of another light this long
+/// after the last one: clients may re-zero and change the light at any rate, and disks wear.
 constexpr std::int64_t kKeepEveryNs = 300'000'000'000;
+constexpr std::int64_t kKeepChangedNs = 30'000'000'000;
 
 }  // namespace
 
@@ -40,7 +41,7 @@ void ReferenceTracker::restore(std::span<const std::uint16_t> reference_q8,
 
 void ReferenceTracker::use(CalibratedImage* image) noexcept {
   image_ = image;
-  kept_ns_.reset();
+  keep_every_ns_ = kKeepChangedNs;
   if (image == nullptr) return;
   other_light_ = light_differs(*image->calibration, ring_light());
   keeper_.use_calibration(image->calibration->model->reference_q8, image->grid, image->region,
@@ -61,9 +62,14 @@ void ReferenceTracker::camera_began() noexcept { keeper_.begin(); }
 void ReferenceTracker::light_changed(const hal::Light& before) noexcept {
   // Rewriting the light that is already shown leaves the reference valid.
   if (before == ring_light()) return;
-  kept_ns_.reset();
+  keep_every_ns_ = kKeepChangedNs;
   keeper_.light_changed(in_contact_, before.leds == ring_light().leds);
   other_light_ = image_ != nullptr && light_differs(*image_->calibration, ring_light());
+}
+
+void ReferenceTracker::exposure_changed() noexcept {
+  keep_every_ns_ = kKeepChangedNs;
+  keeper_.light_changed(in_contact_, true);
 }
 
 Observation ReferenceTracker::look(const hal::LumaView& luma, const FrameState& moment) noexcept {
@@ -115,9 +121,11 @@ void ReferenceTracker::use_reference() noexcept {
 
 /// The writer may still be busy: then the next frame offers the reference again.
 void ReferenceTracker::keep_reference(std::int64_t now_ns) noexcept {
-  if (!keep_due_ || (kept_ns_ && now_ns - *kept_ns_ < kKeepEveryNs)) return;
+  if (!keep_due_ || (kept_ns_ && now_ns - *kept_ns_ < keep_every_ns_)) return;
   keep_due_ = !writer_.offer(keeper_.reference(), ring_light(), image_->calibration);
-  if (!keep_due_) kept_ns_ = now_ns;
+  if (keep_due_) return;
+  kept_ns_ = now_ns;
+  keep_every_ns_ = kKeepEveryNs;
 }
 
 void ReferenceTracker::stop() noexcept {

@@ -83,6 +83,8 @@ class ReferenceTracker {
   void camera_began() noexcept;
   /// The timeline's light has changed from `before`.
   void light_changed(const hal::Light& before) noexcept;
+  /// Exposure or gain has changed, to the picture another light of the same shape.
+  void exposure_changed() noexcept;
   /// Requests the present image as reference. A returned outcome is an immediate refusal; otherwise
   /// look() returns it. Only while there is a calibration.
   [[nodiscard]] std::optional<Outcome> rezero(bool force) noexcept {
@@ -145,8 +147,8 @@ class ReferenceTracker {
   bool other_light_ = false;  // the ring shows another than at calibration
   bool other_level_ = false;  // the reference's light is not the calibration's, and it matters
   bool keep_due_ = false;     // the reference in use waits to be written
-  /// When one by this calibration under this light was written last, CLOCK_MONOTONIC.
-  std::optional<std::int64_t> kept_ns_;
+  std::optional<std::int64_t> kept_ns_;  // when one was written last, CLOCK_MONOTONIC
+  std::int64_t keep_every_ns_ = 0;       // how long after it the next may be
 };
 
 }  // namespace dtact::pipeline

@@ -1,4 +1,4 @@
-#include "daemon/metrics/machine.hpp"
+#include "hal/base/machine.hpp"
 
 #include <malloc.h>
 
@@ -6,7 +6,7 @@
 #include <fstream>
 #include <system_error>
 
-namespace dtact::metrics {
+namespace dtact::base {
 
 Heap heap() noexcept {
   const auto info = ::mallinfo2();
@@ -32,4 +32,4 @@ std::vector<Temperature> temperatures(const fs::path& folder) {
   return all;
 }
 
-}  // namespace dtact::metrics
+}  // namespace dtact::base

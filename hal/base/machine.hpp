@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-namespace dtact::metrics {
+namespace dtact::base {
 
 /// What the C library's allocator holds, over all of its arenas, bytes. A leak makes `used` grow;
 /// memory that is only kept or in pieces is `free`.
@@ -27,8 +27,9 @@ struct Temperature {
 };
 
 /// What the kernel's thermal zones read now, in the order of their names; those that do not answer
-/// are left out. `folder`: as in the kernel's Documentation/ABI/testing/sysfs-class-thermal.
+/// are left out. Some take long to read, as a firmware answers. `folder`: as in the kernel's
+/// Documentation/ABI/testing/sysfs-class-thermal.
 [[nodiscard]] std::vector<Temperature> temperatures(
     const std::filesystem::path& folder = "/sys/class/thermal");
 
-}  // namespace dtact::metrics
+}  // namespace dtact::base
