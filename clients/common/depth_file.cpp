@@ -6,12 +6,14 @@
 #include <bit>
 #include <cmath>
 #include <cstdint>
-#include <filesystem>
-#include <vector>
+#include <cstdlib>
+#include <stdexcept>
+#include <string_view>
 
 #include "clients/common/colours.hpp"
 #include "clients/common/exit_codes.hpp"
 #include "clients/geometry/cloud_file.hpp"
+#include "hal/base/atomic_file.hpp"
 #include "hal/files/png.hpp"
 
 namespace dtact::cli {
@@ -79,6 +81,55 @@ std::string npy_values(std::span<const float> values) {
 
 std::string encode_npy(const DepthImage& depth) {
   return npy_head(fmt::format("({}, {})", depth.height, depth.width)) + npy_values(depth.mm);
+}
+
+// https://numpy.org/doc/stable/reference/generated/numpy.lib.format.html
+NpyArray read_npy(const std::filesystem::path& file) {
+  const std::string bytes = base::read_file(file);
+  const auto refuse = [&file] {
+    throw std::runtime_error(file.string() +
+                             ": is no array of float32 or float64 as NumPy saves it (.npy)");
+  };
+  const auto unsigned_at = [&bytes](std::size_t at, std::size_t count) {
+    std::uint64_t value = 0;
+    for (std::size_t i = count; i-- > 0;) {
+      value = value << 8U | static_cast<std::uint8_t>(bytes[at + i]);
+    }
+    return value;
+  };
+  constexpr std::size_t kBefore = 8;  // magic and version
+  if (bytes.size() < kBefore + 4 || !bytes.starts_with("\x93NUMPY")) refuse();
+  const std::size_t length = bytes[6] == 1 ? 2 : 4;
+  const std::size_t data = kBefore + length + unsigned_at(kBefore, length);
+  if (data > bytes.size()) refuse();
+  const std::string header = bytes.substr(kBefore, data - kBefore);
+  const bool is_double = header.find("'<f8'") != std::string::npos;
+  const std::size_t size = is_double ? 8 : 4;
+  const std::size_t shape = header.find("'shape': (");
+  if ((!is_double && header.find("'<f4'") == std::string::npos) || shape == std::string::npos ||
+      header.find("'fortran_order': False") == std::string::npos) {
+    refuse();
+  }
+  const std::size_t count = (bytes.size() - data) / size;
+  NpyArray array;
+  std::size_t product = 1;
+  const char* at = header.c_str() + shape + std::string_view("'shape': (").size();
+  while (*at >= '0' && *at <= '9') {
+    char* end = nullptr;
+    array.shape.push_back(std::strtoull(at, &end, 10));
+    // Checked before it is multiplied, so that it does not overflow.
+    if (array.shape.back() == 0 || array.shape.back() > count) refuse();
+    product = std::min(product * array.shape.back(), count + 1);
+    for (at = end; *at == ',' || *at == ' ';) ++at;
+  }
+  if (*at != ')' || product != count || data + count * size != bytes.size()) refuse();
+  array.values.reserve(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::uint64_t bits = unsigned_at(data + size * i, size);
+    array.values.push_back(is_double ? std::bit_cast<double>(bits)
+                                     : std::bit_cast<float>(static_cast<std::uint32_t>(bits)));
+  }
+  return array;
 }
 
 std::string encode_micrometre_png(const DepthImage& depth) {

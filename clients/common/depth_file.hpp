@@ -1,7 +1,10 @@
 #pragma once
 
+#include <cstddef>
+#include <filesystem>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "daemon/recon/surface.hpp"
 
@@ -27,6 +30,15 @@ struct DepthImage {
 [[nodiscard]] std::string npy_values(std::span<const float> values);
 /// Both, of shape (height, width).
 [[nodiscard]] std::string encode_npy(const DepthImage& depth);
+
+/// An array that NumPy saved.
+struct NpyArray {
+  std::vector<std::size_t> shape;
+  std::vector<double> values;  ///< Row-major.
+};
+/// Reads a .npy file of float32 or float64, of at most 64 MiB. Throws std::runtime_error naming the
+/// file.
+[[nodiscard]] NpyArray read_npy(const std::filesystem::path& file);
 
 /// A 16-bit PNG in micrometres: 0 where untrusted or less, 65535 where more.
 [[nodiscard]] std::string encode_micrometre_png(const DepthImage& depth);

@@ -3,9 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 
 #include "clients/cpp/errors.hpp"
+#include "clients/cpp/maps.hpp"
+#include "daemon/recon/rectify.hpp"
 #include "daemon/recon/surface.hpp"
 
 namespace dtact::cli {
@@ -35,12 +38,38 @@ Kind kind_of(v1::Surface::Shape shape) {
 /// False for NaN.
 bool within(double value, double low, double high) { return value >= low && value <= high; }
 
+/// Whether the map lies in its whole, which is no larger than a daemon's.
+bool is_placed(const v1::DepthMap& map) {
+  const std::uint64_t full_width = map.full_width();
+  const std::uint64_t full_height = map.full_height();
+  return std::uint64_t{map.x()} + map.width() <= full_width &&
+         std::uint64_t{map.y()} + map.height() <= full_height &&
+         full_width * full_height <= std::uint64_t{recon::kMaxMapPixels};
+}
+
+[[noreturn]] void refuse(const v1::DepthMap& map) {
+  throw client::ProtocolError(fmt::format(
+      "a depth map of {}x{} pixels at {}, {} of {}x{}, {} mm a pixel and {} um a unit contradicts "
+      "itself: install the same release on both sides",
+      map.width(), map.height(), map.x(), map.y(), map.full_width(), map.full_height(),
+      map.mm_per_px(), map.um_per_unit()));
+}
+
 }  // namespace
 
 recon::Surface surface_of(const v1::Surface& surface) {
   recon::Surface made;
   made.kind = kind_of(surface.shape());
-  if (made.kind == Kind::plane) return made;
+  if (made.kind == Kind::plane) {
+    made.view = {{surface.foot_x_mm(), surface.foot_y_mm()}, surface.per_mm()};
+    if (!within(made.view.per_mm, 0, Limits::kMaxPerMm) ||
+        !within(made.view.foot_mm.x, -Limits::kMaxFootMm, Limits::kMaxFootMm) ||
+        !within(made.view.foot_mm.y, -Limits::kMaxFootMm, Limits::kMaxFootMm)) {
+      refuse(fmt::format("seen from above {}, {} mm with {} for each mm of height cannot be",
+                         surface.foot_x_mm(), surface.foot_y_mm(), surface.per_mm()));
+    }
+    return made;
+  }
   made.air_mm = surface.air_mm();
   made.gel_mm = surface.gel_mm();
   made.refraction = surface.refraction();
@@ -59,27 +88,54 @@ recon::Surface surface_of(const v1::Surface& surface) {
   return made;
 }
 
+void set_surface(const recon::Surface& surface, v1::Frame& frame) {
+  frame.clear_surface();
+  if (surface == recon::Surface{}) return;
+  v1::Surface& out = *frame.mutable_surface();
+  out.set_shape(surface.kind == Kind::plane    ? v1::Surface::PLANE
+                : surface.kind == Kind::sphere ? v1::Surface::SPHERE
+                                               : v1::Surface::CYLINDER);
+  out.set_radius_mm(surface.radius_mm);
+  out.set_axis_deg(surface.axis_deg);
+  out.set_air_mm(surface.air_mm);
+  out.set_gel_mm(surface.gel_mm);
+  out.set_refraction(surface.refraction);
+  out.set_foot_x_mm(surface.view.foot_mm.x);
+  out.set_foot_y_mm(surface.view.foot_mm.y);
+  out.set_per_mm(surface.view.per_mm);
+}
+
+std::vector<std::int16_t> depths_of(const v1::DepthMap& map) {
+  const bool scaled = map.mm_per_px() > 0 && std::isfinite(map.mm_per_px()) &&
+                      map.um_per_unit() > 0 && std::isfinite(map.um_per_unit());
+  if (!is_placed(map) || !scaled) refuse(map);
+  return client::values_of(map);
+}
+
+perceive::DepthGrid grid_of(const v1::DepthMap& map, std::span<const std::int16_t> values) {
+  return {.x = static_cast<int>(map.x()),
+          .y = static_cast<int>(map.y()),
+          .width = static_cast<int>(map.width()),
+          .height = static_cast<int>(map.height()),
+          .full_width = static_cast<int>(map.full_width()),
+          .full_height = static_cast<int>(map.full_height()),
+          .mm_per_px = map.mm_per_px(),
+          .um_per_unit = map.um_per_unit(),
+          .untrusted = map.untrusted_value(),
+          .values = values};
+}
+
 DepthImage depth_image(const v1::Frame& frame, std::span<const float> mm) {
   const v1::DepthMap& map = frame.depth();
-  const std::uint64_t full_width = map.full_width();
-  const std::uint64_t full_height = map.full_height();
-  constexpr std::uint64_t kMaxSide = 1U << 20U;
-  if (std::uint64_t{map.x()} + map.width() > full_width ||
-      std::uint64_t{map.y()} + map.height() > full_height || full_width > kMaxSide ||
-      full_height > kMaxSide) {
-    throw client::ProtocolError(
-        fmt::format("a depth map of {}x{} pixels at {}, {} of {}x{} contradicts itself: install "
-                    "the same release on both sides",
-                    map.width(), map.height(), map.x(), map.y(), full_width, full_height));
-  }
+  if (!is_placed(map)) refuse(map);
   return {.width = static_cast<int>(map.width()),
           .height = static_cast<int>(map.height()),
           .mm_per_px = map.mm_per_px(),
           .mm = mm,
           .x = static_cast<int>(map.x()),
           .y = static_cast<int>(map.y()),
-          .full_width = static_cast<int>(full_width),
-          .full_height = static_cast<int>(full_height),
+          .full_width = static_cast<int>(map.full_width()),
+          .full_height = static_cast<int>(map.full_height()),
           .surface = surface_of(frame.surface())};
 }
 

@@ -28,9 +28,9 @@ constexpr std::uint64_t kHelloId = 1;
 }  // namespace
 
 Link::Link(client::Options options, Handlers handlers)
-    : options_(std::move(options)),
-      handlers_(std::move(handlers)),
-      wake_(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {
+    : handlers_(std::move(handlers)),
+      wake_(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)),
+      options_(std::move(options)) {
   if (!wake_) throw std::system_error(errno, std::generic_category(), "eventfd");
   thread_ = std::thread([this] { run(); });
 }
@@ -47,6 +47,11 @@ void Link::send(std::string message) {
     outgoing_.push_back(std::move(message));
   }
   wake();
+}
+
+void Link::use(client::Options options) {
+  const std::lock_guard lock(mutex_);
+  options_ = std::move(options);
 }
 
 void Link::stop() noexcept {
@@ -67,8 +72,12 @@ void Link::run() {
   auto lasted_from = Clock::time_point::max();
   while (!stopping_) {
     try {
-      client::Connection connection(options_, {Clock::now() + options_.timeout, wake_.get()});
-      v1::HelloReply daemon = greet(connection);
+      const client::Options options = [this] {
+        const std::lock_guard lock(mutex_);
+        return options_;
+      }();
+      client::Connection connection(options, {Clock::now() + options.timeout, wake_.get()});
+      v1::HelloReply daemon = greet(connection, options);
       {
         const std::lock_guard lock(mutex_);
         up_ = true;
@@ -76,7 +85,7 @@ void Link::run() {
       reported.clear();
       lasted_from = Clock::now() + kPauses.max;
       handlers_.up(std::move(daemon), connection.local());
-      serve(connection);
+      serve(connection, options.timeout);
     } catch (const std::exception& e) {
       forget_outgoing();
       if (stopping_) break;
@@ -104,11 +113,11 @@ void Link::drain() const noexcept {
   (void)!::read(wake_.get(), &count, sizeof count);
 }
 
-v1::HelloReply Link::greet(client::Connection& connection) const {
-  const client::Limit limit{Clock::now() + options_.timeout, wake_.get()};
+v1::HelloReply Link::greet(client::Connection& connection, const client::Options& options) const {
+  const client::Limit limit{Clock::now() + options.timeout, wake_.get()};
   v1::ClientMessage hello;
   hello.set_id(kHelloId);
-  *hello.mutable_hello() = client::hello_for(options_, connection);
+  *hello.mutable_hello() = client::hello_for(options, connection);
   connection.write(hello.SerializeAsString(), limit);
   const std::string* bytes = connection.read(limit);
   if (bytes == nullptr) {
@@ -123,7 +132,7 @@ v1::HelloReply Link::greet(client::Connection& connection) const {
   return std::move(*answer.mutable_reply()->mutable_hello());
 }
 
-void Link::serve(client::Connection& connection) {
+void Link::serve(client::Connection& connection, std::chrono::milliseconds timeout) {
   for (;;) {
     // First, so that a wake-up by stop() is not consumed unnoticed.
     drain();
@@ -134,7 +143,7 @@ void Link::serve(client::Connection& connection) {
       outgoing.swap(outgoing_);
     }
     for (const std::string& message : outgoing) {
-      connection.write(message, {Clock::now() + options_.timeout});
+      connection.write(message, {Clock::now() + timeout});
     }
     while (const std::string* message = connection.read({Clock::now() + kForever, wake_.get()})) {
       handlers_.message(*message);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <atomic>
+#include <chrono>
 #include <functional>
 #include <mutex>
 #include <string>
@@ -35,25 +36,28 @@ class Link {
 
   /// A ClientMessage, serialized. Lost when the connection is away, or breaks before it is written.
   void send(std::string message);
+  /// Reaches the daemon with these from the next connection on.
+  void use(client::Options options);
   /// Lets the thread end. No handler is called after the one that runs.
   void stop() noexcept;
   [[nodiscard]] bool ended() const noexcept { return ended_; }
 
  private:
   void run();
-  [[nodiscard]] v1::HelloReply greet(client::Connection& connection) const;
-  void serve(client::Connection& connection);
+  [[nodiscard]] v1::HelloReply greet(client::Connection& connection,
+                                     const client::Options& options) const;
+  void serve(client::Connection& connection, std::chrono::milliseconds timeout);
   void forget_outgoing();
   void wake() const noexcept;
   void drain() const noexcept;
 
-  client::Options options_;
   Handlers handlers_;
   base::UniqueFd wake_;  ///< An eventfd.
   std::atomic<bool> stopping_ = false;
   std::atomic<bool> ended_ = false;
   std::mutex mutex_;
   // Under the mutex:
+  client::Options options_;
   bool up_ = false;
   std::vector<std::string> outgoing_;
   std::thread thread_;

@@ -95,7 +95,7 @@ std::vector<std::string> given_options(const CLI::App& app) {
 std::string command_line(const CLI::App& command) {
   std::string text = " " + command.get_name() + options_of(command);
   for (const CLI::App* app = command.get_parent(); app != nullptr; app = app->get_parent()) {
-    text = " " + app->get_name() + options_of(*app) + text;
+    text.insert(0, " " + app->get_name() + options_of(*app));
   }
   return text.substr(1);
 }

@@ -158,6 +158,7 @@ base::UniqueFd connect_first(const addrinfo* next, const Limit& limit, int& erro
       continue;
     }
     std::vector<pollfd> waiting;
+    waiting.reserve(attempts.size() + 1);
     for (const base::UniqueFd& fd : attempts) waiting.push_back({fd.get(), POLLOUT, 0});
     waiting.push_back({limit.wake, POLLIN, 0});
     const auto until = next == nullptr ? limit.end : std::min(limit.end, next_due);

@@ -66,6 +66,12 @@ void Client::rezero(bool force) {
   (void)session_->request(message, session_->options().timeout + within);
 }
 
+v1::CameraSettings Client::set_camera(const v1::SetCamera& change) {
+  v1::ClientMessage message;
+  *message.mutable_set_camera() = change;
+  return session_->request(message, session_->options().timeout).camera();
+}
+
 v1::Reconstruction Client::set_reconstruction(const v1::SetReconstruction& change) {
   v1::ClientMessage message;
   *message.mutable_set_reconstruction() = change;

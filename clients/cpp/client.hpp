@@ -80,6 +80,8 @@ class DTACT_EXPORT Client {
   /// Takes a new reference image; `force`: even in contact. Waits for the frames that the daemon
   /// averages, on top of Options::timeout.
   void rezero(bool force = false);
+  /// Changes exposure and gain of the camera. Returns both as the camera has them then.
+  v1::CameraSettings set_camera(const v1::SetCamera& change);
   /// Changes how depth is reconstructed. Returns the settings once frames use them.
   v1::Reconstruction set_reconstruction(const v1::SetReconstruction& change);
   [[nodiscard]] v1::Status status();

@@ -39,12 +39,13 @@ std::string read_token(const fs::path& file) {
                             file.string()));
   }
   token.erase(token.find_last_not_of(" \t\r") + 1);
-  // The daemon's own file has lines like "control TOKEN NAME".
+  // The daemon's own file has lines like "control HASH NAME".
   if (token.empty() || token.size() > wire::kMaxToken || token.find(' ') != std::string::npos) {
-    throw Error(fmt::format(
-        "the first line of {} is no token: it has 1 to {} bytes and no blanks. Of a line for the "
-        "daemon (dtactctl token) it is the second word",
-        file.string(), wire::kMaxToken));
+    throw Error(
+        fmt::format("the first line of {} is no token: it has 1 to {} bytes and no blanks. A line "
+                    "for the daemon "
+                    "has only its hash: the token is in the file of dtactctl token -o",
+                    file.string(), wire::kMaxToken));
   }
   return token;
 }

@@ -154,7 +154,7 @@ void add_bench(CLI::App& app, Context& context) {
       "estimate of their clocks' offset), jitter, bytes, frames missed here, skipped by the daemon "
       "and lost by the camera");
   const auto options = std::make_shared<BenchOptions>();
-  command->add_option("--seconds", options->seconds, "For so long each")
+  command->add_option("--seconds", options->seconds, "Seconds to measure, of each encoding")
       ->check(cli::positive())
       ->capture_default_str();
   command->add_flag("--encodings", options->encodings,

@@ -54,10 +54,7 @@ void print_json(const Context& context, const std::string& name, const Id& numbe
 }
 
 void upload(const Context& context, const fs::path& folder, const std::string& name) {
-  v1::UploadCalibration files;
-  files.set_name(name.empty() ? name_of(folder) : name);
-  files.set_calibration_toml(base::read_file(folder / kToml));
-  files.set_reference_png(base::read_file(folder / kPng));
+  const v1::UploadCalibration files = read_calibration(folder, name);
   const v1::Done done = client::Client(context.target).upload_calibration(files);
   const Id number = done.has_calibration() ? Id(done.calibration()) : Id();
   if (context.json) return print_json(context, files.name(), number, {}, &done);
@@ -147,6 +144,14 @@ std::string check_id(const std::string& text) {
 }
 
 }  // namespace
+
+v1::UploadCalibration read_calibration(const fs::path& folder, const std::string& name) {
+  v1::UploadCalibration files;
+  files.set_name(name.empty() ? name_of(folder) : name);
+  files.set_calibration_toml(base::read_file(folder / kToml));
+  files.set_reference_png(base::read_file(folder / kPng));
+  return files;
+}
 
 void add_calibration(CLI::App& app, Context& context) {
   auto* command = app.add_subcommand("calibration", "The daemon's calibrations");

@@ -15,7 +15,9 @@ void set_up(CLI::App& app, cli::Context& context) {
   add_setup(app, context);
   add_bench(app, context);
   add_find(app, context);
+  add_fleet(app, context);
   add_led(app, context);
+  add_camera(app, context);
   add_rezero(app, context);
   add_reconstruction(app, context);
   add_calibration(app, context);

@@ -6,9 +6,9 @@
 #include <ostream>
 #include <string>
 
+#include "clients/common/avahi.hpp"
 #include "clients/common/exit_codes.hpp"
 #include "clients/common/json.hpp"
-#include "clients/ctl/avahi.hpp"
 #include "clients/ctl/online.hpp"
 
 namespace dtact::ctl {
@@ -26,17 +26,12 @@ std::string line_of(const cli::FoundDaemon& one) {
 }
 
 void find(const Context& context, double seconds) {
-  const auto all = browse(
+  const auto all = cli::browse(
       std::chrono::milliseconds(static_cast<std::chrono::milliseconds::rep>(seconds * 1000)));
   for (const auto& one : all) {
     context.out << (context.json ? cli::json_line(one) : line_of(one));
   }
-  if (all.empty()) {
-    throw cli::Failure(
-        cli::kNotMet,
-        "no dtactd announces itself: it does where it listens beyond its own machine "
-        "(net.address, net.announce) and avahi-daemon runs beside it");
-  }
+  if (all.empty()) throw cli::Failure(cli::kNotMet, cli::kNoneAnnounced);
 }
 
 }  // namespace
@@ -45,7 +40,7 @@ void add_find(CLI::App& app, Context& context) {
   auto* command = app.add_subcommand(
       "find", "List the daemons that announce themselves in this network, through avahi-daemon");
   const auto seconds = std::make_shared<double>(3);
-  command->add_option("--seconds", *seconds, "Look at most so long")
+  command->add_option("--seconds", *seconds, "Seconds to look at most")
       ->check(cli::positive())
       ->capture_default_str();
   cli::add_json_option(*command, context);

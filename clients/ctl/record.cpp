@@ -12,6 +12,7 @@
 #include "clients/common/interruptible.hpp"
 #include "clients/common/json.hpp"
 #include "clients/common/reports.pb.h"
+#include "clients/common/sibling_program.hpp"
 #include "clients/ctl/online.hpp"
 #include "clients/recording/channels.hpp"
 #include "clients/recording/recorder.hpp"
@@ -29,9 +30,11 @@ struct RecordOptions {
   bool no_jpeg = false;
   bool force = false;
   bool progress = false;
+  bool ros2 = false;
 };
 
-/// Of dtactd depth and images; of dtact-perceive, which has none, points and poses.
+/// Of dtactd depth and images; of dtact-perceive, which has none, points, poses and what the object
+/// is.
 v1::Subscribe subscription_for(const client::Client& client, const RecordOptions& options) {
   v1::Subscribe subscription;
   if (client.has_feature("cloud")) {
@@ -40,6 +43,7 @@ v1::Subscribe subscription_for(const client::Client& client, const RecordOptions
     subscription.set_contact_box(true);
     subscription.set_decimation(2);
     subscription.set_pose(true);
+    subscription.set_recognition(client.has_feature("recognition"));
     return subscription;
   }
   subscription.set_depth(v1::DEPTH_PREDICT_ZSTD);
@@ -205,6 +209,23 @@ void run_record(const Context& context, const RecordOptions& options) {
   }
 }
 
+/// Becomes dtact-dds, which records as `command` says. Throws std::runtime_error where there is
+/// none.
+[[noreturn]] void become_dds(const CLI::App& command, const RecordOptions& options) {
+  std::vector<std::string> words = cli::given_options(*command.get_parent());
+  words.insert(words.begin(), cli::sibling("dtact-dds"));
+  words.insert(words.end(), {"--read-only", "--record", options.output});
+  if (options.seconds > 0)
+    words.insert(words.end(), {"--seconds", fmt::to_string(options.seconds)});
+  if (options.force) words.emplace_back("--force");
+  std::vector<char*> arguments;
+  arguments.reserve(words.size() + 1);
+  for (std::string& word : words) arguments.push_back(word.data());
+  arguments.push_back(nullptr);
+  ::execvp(arguments.front(), arguments.data());
+  throw std::runtime_error("--ros2 needs dtact-dds: apt install dtact-dds");
+}
+
 }  // namespace
 
 void add_record(CLI::App& app, Context& context) {
@@ -215,7 +236,8 @@ void add_record(CLI::App& app, Context& context) {
   command->add_option("-o,--output", options->output, "The file, press.mcap")
       ->type_name("FILE")
       ->required();
-  command->add_option("--seconds", options->seconds, "End after so long")->check(cli::positive());
+  command->add_option("--seconds", options->seconds, "Seconds after which it ends")
+      ->check(cli::positive());
   command
       ->add_option("--pictures-hz", options->pictures_hz,
                    "Depth pictures for eyes a second, beside the lossless frames; 0: none")
@@ -226,8 +248,15 @@ void add_record(CLI::App& app, Context& context) {
   command->add_flag("--force", options->force, "Replace the file if it exists");
   command->add_flag("--progress", options->progress,
                     "Show rate and size also where standard error is no terminal");
-  cli::add_json_option(*command, context);
-  command->callback([&context, options] { run_record(context, *options); });
+  auto* ros2 = command->add_flag("--ros2", options->ros2,
+                                 "Record ROS 2 messages as ros2 bag does, by dtact-dds; dtact-dds "
+                                 "itself records several sensors in one file");
+  ros2->excludes(cli::add_json_option(*command, context));
+  ros2->excludes("--pictures-hz", "--no-jpeg", "--progress");
+  command->callback([&context, options, command] {
+    if (options->ros2) become_dds(*command, *options);
+    run_record(context, *options);
+  });
 }
 
 }  // namespace dtact::ctl

@@ -35,7 +35,7 @@ using Command = std::vector<std::string>;
 
 constexpr const char* kBoards = "/usr/share/doc/dtactd/examples/boards";
 constexpr const char* kSimulated = "sim";
-const std::vector<std::string> kSteps = {"camera", "check", "restart", "calibrate", "watch"};
+const std::vector<std::string> kSetupSteps = {"camera", "check", "restart", "calibrate", "watch"};
 
 struct SetupOptions {
   std::vector<std::string> steps;  ///< Empty: all.
@@ -46,13 +46,14 @@ struct SetupOptions {
   std::string board;
   std::string radius_mm;
   std::string mm_per_px;
+  std::string ruler;
   std::string lens;
   std::string crop;
 };
 
 /// Runs a program on this terminal. Returns its exit status. Throws when it is not there.
 int run_program(const Command& command, std::ostream& out) {
-  out << "$ " << fmt::format("{}", fmt::join(command, " ")) << std::endl;
+  out << "$ " << fmt::format("{}", fmt::join(command, " ")) << '\n' << std::flush;
   std::vector<char*> arguments;
   for (const std::string& argument : command) {
     arguments.push_back(const_cast<char*>(argument.c_str()));
@@ -97,10 +98,10 @@ class Setup {
 
   void run() {
     const bool all = options_.steps.empty();
-    left_ = all ? kSteps : options_.steps;
+    left_ = all ? kSetupSteps : options_.steps;
     for (; !left_.empty(); left_.erase(left_.begin())) {
       const std::string& step = left_.front();
-      context_.out << fmt::format("\n{} of {}: {}\n", number_of(step), kSteps.size(), step);
+      context_.out << fmt::format("\n{} of {}: {}\n", number_of(step), kSetupSteps.size(), step);
       if (step == "camera") set_camera();
       if (step == "check") check();
       if (step == "restart") restart();
@@ -111,7 +112,7 @@ class Setup {
 
  private:
   static std::ptrdiff_t number_of(const std::string& step) {
-    return std::ranges::find(kSteps, step) - kSteps.begin() + 1;
+    return std::ranges::find(kSetupSteps, step) - kSetupSteps.begin() + 1;
   }
 
   /// Ends the command; gives the command line for the steps that are left.
@@ -337,15 +338,19 @@ class Setup {
     };
     const auto asked = [this](const std::string& given, const std::string& question) {
       const std::string value = given.empty() ? ask(question) : given;
-      if (value.empty()) stop("give --radius-mm, and --mm-per-px or --lens");
+      if (value.empty()) stop("give --radius-mm, and --mm-per-px, --ruler or --lens");
       return value;
     };
     add("--radius-mm", asked(options_.radius_mm, "Radius of the ball that you press in, mm: "));
-    if (options_.lens.empty()) {
-      add("--mm-per-px", asked(options_.mm_per_px,
-                               "Millimetres of the gel that a pixel shows (a ruler's picture, "
-                               "mm over pixels): "));
+    if (options_.lens.empty() && options_.ruler.empty()) {
+      const std::string scale =
+          asked(options_.mm_per_px,
+                "Scale of the picture, mm per pixel. Or, of a ruler or coin that you press in, "
+                "X,Y,X,Y,MM: two points in the picture of dtactctl snapshot --luma and their "
+                "distance: ");
+      add(scale.find(',') == std::string::npos ? "--mm-per-px" : "--ruler", scale);
     }
+    add("--ruler", options_.ruler);
     add("--lens", options_.lens);
     add("--crop", options_.crop);
     if (run_program(command, context_.out) != 0) stop("there is no calibration yet");
@@ -382,7 +387,7 @@ void add_setup(CLI::App& app, Context& context) {
       "guided), watch");
   const auto options = std::make_shared<SetupOptions>();
   command->add_option("step", options->steps, "Only these steps, in this order (default: all)")
-      ->check(CLI::IsMember(kSteps));
+      ->check(CLI::IsMember(kSetupSteps));
   command->add_option("--unit", options->unit, "The service, as dtactd@left")
       ->capture_default_str();
   command->add_option("--config", options->config, "Its configuration (default: in /etc/dtactd)")
@@ -409,6 +414,8 @@ void add_setup(CLI::App& app, Context& context) {
       ->add_option("--mm-per-px", options->mm_per_px,
                    "See dtact-calibrate guided; asked for if not given")
       ->type_name("MM");
+  command->add_option("--ruler", options->ruler, "See dtact-calibrate guided")
+      ->type_name("X,Y,X,Y,MM");
   command->add_option("--lens", options->lens, "See dtact-calibrate guided")->type_name("FILE");
   command->add_option("--crop", options->crop, "See dtact-calibrate guided")->type_name("W,H");
   command->callback([&context, command, options] { Setup(context, *command, *options).run(); });

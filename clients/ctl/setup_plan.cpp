@@ -115,7 +115,8 @@ Settings settings_of(const std::string& toml, const std::string& where) {
   return settings;
 }
 
-std::string with_settings(std::string toml, const Settings& settings, const std::string& where) {
+std::string with_settings(const std::string& toml, const Settings& settings,
+                          const std::string& where) {
   (void)settings_of(toml, where);  // a file with a mistake is refused as it is
   std::vector<std::string> lines = lines_of(toml);
   for (const Setting& setting : settings) set(lines, setting);

@@ -23,7 +23,7 @@ using Settings = std::vector<Setting>;
 
 /// The text of a configuration with these values; everything else stays, comments included. Throws
 /// std::runtime_error naming `where` and the key that has to be set by hand.
-[[nodiscard]] std::string with_settings(std::string toml, const Settings& settings,
+[[nodiscard]] std::string with_settings(const std::string& toml, const Settings& settings,
                                         const std::string& where);
 
 /// A size and rate of the camera.

@@ -113,7 +113,10 @@ void print(const v1::Status& status, std::ostream& out) {
                : c.rights() == v1::RIGHTS_CONTROL ? ", may not calibrate"
                                                   : "");
   }
-  fmt::print(out, "version      {}, up {:.0f} s\n", status.version(), status.uptime_s());
+  fmt::print(out, "version      {}, up {:.0f} s{}\n", status.version(), status.uptime_s(),
+             status.has_board_celsius()
+                 ? fmt::format(", board at {:.0f} °C", status.board_celsius())
+                 : "");
 }
 
 }  // namespace

@@ -220,7 +220,7 @@ void add_watch(CLI::App& app, Context& context) {
       "summary says which moment the camera stamps), drops and "
       "health until Ctrl-C, then a summary");
   const auto options = std::make_shared<WatchOptions>();
-  command->add_option("--seconds", options->seconds, "End by itself after so long")
+  command->add_option("--seconds", options->seconds, "Seconds after which it ends by itself")
       ->check(cli::positive());
   auto* min_fps =
       command

@@ -12,6 +12,7 @@ inline constexpr const char* kDepthTopic = "/dtact/depth";
 inline constexpr const char* kCameraTopic = "/camera/jpeg";
 inline constexpr const char* kPointsTopic = "/dtact/points";
 inline constexpr const char* kPoseTopic = "/dtact/pose";
+inline constexpr const char* kRecognitionTopic = "/dtact/recognition";
 inline constexpr const char* kTransformsTopic = "/tf";
 
 inline constexpr const char* kCalibrationToml = "calibration.toml";

@@ -5,6 +5,7 @@
 #include <mutex>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "clients/common/link.hpp"
 #include "clients/cpp/options.hpp"
@@ -32,6 +33,7 @@ class Feed {
   /// The newest frame that was not taken yet. From any thread.
   [[nodiscard]] std::optional<Taken> take();
   /// See Link.
+  void use(client::Options options) { link_.use(std::move(options)); }
   void stop() noexcept { link_.stop(); }
   [[nodiscard]] bool ended() const noexcept { return link_.ended(); }
 

@@ -125,7 +125,7 @@ class HttpConnection : public std::enable_shared_from_this<HttpConnection<Stream
                     refusal(http::status::method_not_allowed, "only GET and HEAD are known here"),
                     true);
     }
-    answer(request, site->answer(request), !request.keep_alive());
+    answer(request, site->answer(request, peer_), !request.keep_alive());
   }
 
   void answer(const Request& request, Answer made, bool last) {
@@ -203,9 +203,12 @@ class HttpConnection : public std::enable_shared_from_this<HttpConnection<Stream
                                      wanted = std::move(wanted)](const error_code& error) {
       self->timer_.cancel();
       if (error) return;
-      wanted.open(
-          std::make_shared<BeastWebSocket<Stream>>(std::move(self->channel_), self->peer_timeout_),
-          std::move(self->peer_));
+      const auto socket =
+          std::make_shared<BeastWebSocket<Stream>>(std::move(self->channel_), self->peer_timeout_);
+      self->ticket_->close = [weak = std::weak_ptr(socket)] {
+        if (const auto open = weak.lock()) open->close();
+      };
+      wanted.open(socket, std::move(self->peer_), std::move(self->ticket_));
     });
   }
 

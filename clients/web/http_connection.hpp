@@ -15,9 +15,10 @@
 
 namespace dtact::web {
 
-/// Bounds the connections that speak HTTP, so that they cannot take all descriptors. Beyond a limit
-/// a new one takes the place of the oldest, of the same host or of the host with most of them: that
-/// one has sent half a request, waits for a refusal, or is idle. On one thread.
+/// Bounds the connections that speak HTTP, and the WebSockets whose peer is not authenticated, so
+/// that they cannot take all descriptors. Beyond a limit a new one takes the place of the oldest,
+/// of the same host or of the host with most of them: that one has sent half a request, waits for a
+/// refusal, is idle or has sent no token. On one thread.
 class HttpLimits {
  public:
   static constexpr std::size_t kMax = 128;
@@ -51,7 +52,7 @@ class HttpLimits {
 
 /// Speaks HTTP/1.1 with a peer until it leaves, upgrades to a WebSocket, breaks a limit or is
 /// silent for too long: GET and HEAD without a body, heads of at most 8 kB. `ticket` is kept
-/// meanwhile. Without `tls` plain; it must outlive the connection.
+/// meanwhile, and passed to Upgrade::open. Without `tls` plain; it must outlive the connection.
 void serve_http(boost::asio::ip::tcp::socket socket, net::Peer peer, boost::asio::ssl::context* tls,
                 std::weak_ptr<Site> site, std::shared_ptr<HttpLimits::Ticket> ticket,
                 std::chrono::milliseconds peer_timeout);

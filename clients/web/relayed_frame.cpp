@@ -25,7 +25,7 @@ constexpr std::uint32_t tag(int field, std::uint32_t wire_type) {
 constexpr bool is_part(std::uint32_t field) {
   return field == v1::Frame::kDepthFieldNumber || field == v1::Frame::kLumaFieldNumber ||
          field == v1::Frame::kJpegFieldNumber || field == v1::Frame::kCloudFieldNumber ||
-         field == v1::Frame::kPoseFieldNumber;
+         field == v1::Frame::kPoseFieldNumber || field == v1::Frame::kRecognitionFieldNumber;
 }
 
 CodedInputStream reader(std::string_view bytes) {

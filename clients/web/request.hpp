@@ -36,7 +36,9 @@ struct Upgrade {
   Answer refusal = {};           ///< Where `open` is null.
   std::string subprotocol = {};  ///< The chosen one; empty: none was offered.
   std::size_t max_message = 0;   ///< From the peer, bytes.
-  std::function<void(std::shared_ptr<WebSocket>, net::Peer)> open = {};
+  /// The last argument is the peer's place among the connections of unauthenticated peers, to be
+  /// kept until it is authenticated.
+  std::function<void(std::shared_ptr<WebSocket>, net::Peer, std::shared_ptr<void>)> open = {};
 };
 
 /// What HTTP connections are there for. On their thread.
@@ -47,7 +49,7 @@ class Site {
   Site& operator=(const Site&) = delete;
   virtual ~Site() = default;
 
-  [[nodiscard]] virtual Answer answer(const Request& request) = 0;
+  [[nodiscard]] virtual Answer answer(const Request& request, const net::Peer& peer) = 0;
   [[nodiscard]] virtual Upgrade upgrade(const Request& request, const net::Peer& peer) = 0;
 };
 

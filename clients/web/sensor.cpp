@@ -4,9 +4,11 @@
 
 #include <algorithm>
 #include <boost/asio/post.hpp>
+#include <cmath>
 #include <utility>
 
 #include "clients/common/json.hpp"
+#include "clients/cpp/names.hpp"
 #include "daemon/serve/subscription.hpp"
 #include "version.hpp"
 
@@ -24,12 +26,24 @@ void send(net::Session& session, std::uint64_t id, v1::Reply reply) {
   session.send(message);
 }
 
+/// What /fleet says of a status, which has more.
+std::string json_of(const v1::Status& status) {
+  std::string health;
+  for (const std::string& flag : client::names_of(status.health())) {
+    health += (health.empty() ? "" : ",") + cli::json_string(flag);
+  }
+  return fmt::format(R"({{"state":{},"fps":{:.1f},"version":{},"health":[{}],"advice":{}}})",
+                     cli::json_string(client::name_of(status.state())),
+                     std::isfinite(status.fps()) ? status.fps() : 0,
+                     cli::json_string(status.version()), health, cli::json_string(status.advice()));
+}
+
 /// All that the daemon lets through, since rates were its part.
 Subscription every_frame(v1::Subscribe request) {
-  for (const auto clear :
-       {&v1::Subscribe::clear_every, &v1::Subscribe::clear_depth_hz, &v1::Subscribe::clear_luma_hz,
-        &v1::Subscribe::clear_jpeg_hz, &v1::Subscribe::clear_summary_hz,
-        &v1::Subscribe::clear_cloud_hz, &v1::Subscribe::clear_pose_hz}) {
+  for (const auto clear : {&v1::Subscribe::clear_every, &v1::Subscribe::clear_depth_hz,
+                           &v1::Subscribe::clear_luma_hz, &v1::Subscribe::clear_jpeg_hz,
+                           &v1::Subscribe::clear_summary_hz, &v1::Subscribe::clear_cloud_hz,
+                           &v1::Subscribe::clear_pose_hz, &v1::Subscribe::clear_recognition_hz}) {
     (request.*clear)();
   }
   auto made = Subscription::from(request, {}, net::Serves::everything);
@@ -56,8 +70,9 @@ void Sensor::stop() {
   session_list_.dismiss("dtact-web ends");
 }
 
-void Sensor::admit(std::shared_ptr<WebSocket> socket, net::Peer peer) {
-  auto transport = std::make_unique<WireTransport>(std::move(socket), std::move(peer));
+void Sensor::admit(std::shared_ptr<WebSocket> socket, net::Peer peer, std::shared_ptr<void> place) {
+  auto transport =
+      std::make_unique<WireTransport>(std::move(socket), std::move(peer), std::move(place));
   WireTransport* const there = transport.get();
   const auto session =
       std::make_shared<net::Session>(std::move(transport), config_, admission_, weak_from_this());
@@ -79,7 +94,29 @@ std::string Sensor::entry() const {
   return text + "}";
 }
 
+std::string Sensor::entry_with_status() const {
+  std::string text = entry();
+  if (!status_.empty()) text.insert(text.size() - 1, ",\"status\":" + status_);
+  return text;
+}
+
+void Sensor::ask_status() {
+  const auto now = std::chrono::steady_clock::now();
+  if (!source_->connected() || now < status_asked_ + std::chrono::seconds(1)) return;
+  status_asked_ = now;
+  v1::ClientMessage message;
+  message.mutable_get_status();
+  source_->request(std::move(message), config_.program,
+                   [weak = weak_from_this()](const v1::Reply& reply) {
+                     const auto self = weak.lock();
+                     if (self != nullptr && reply.has_status()) {
+                       self->status_ = json_of(reply.status());
+                     }
+                   });
+}
+
 void Sensor::on_changed() {
+  status_.clear();
   const auto& daemon = source_->daemon();
   const bool there = daemon && source_->connected();
   config_.log(
@@ -101,6 +138,7 @@ void Sensor::introduce(v1::HelloReply& reply) const {
   *reply.mutable_surface_frame() = daemon->surface_frame();
   reply.set_name(daemon->name());
   reply.set_serial(daemon->serial());
+  reply.set_instance(daemon->instance());
   reply.set_rezero_timeout_s(daemon->rezero_timeout_s());
   reply.set_rights(std::min(reply.rights(), daemon->rights()));
 }

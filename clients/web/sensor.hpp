@@ -1,6 +1,7 @@
 #pragma once
 
 #include <boost/asio/io_context.hpp>
+#include <chrono>
 #include <cstdint>
 #include <map>
 #include <memory>
@@ -29,9 +30,14 @@ class Sensor : public net::SessionHost, public std::enable_shared_from_this<Sens
   /// Ends the viewers whose token was revoked or has other rights now.
   void end_revoked() const { session_list_.end_revoked(); }
   /// A new viewer.
-  void admit(std::shared_ptr<WebSocket> socket, net::Peer peer);
+  /// A connection that is not authenticated yet; `place`: see Upgrade::open.
+  void admit(std::shared_ptr<WebSocket> socket, net::Peer peer, std::shared_ptr<void> place);
   /// The sensor's entry of /sensors, see README.md in this folder.
   [[nodiscard]] std::string entry() const;
+  /// The sensor's entry of /fleet: the same with its status, once that is known.
+  [[nodiscard]] std::string entry_with_status() const;
+  /// Asks the daemon for its status, at most once a second however many viewers there are.
+  void ask_status();
   [[nodiscard]] Source& source() const noexcept { return *source_; }
   [[nodiscard]] const std::shared_ptr<Source>& shared_source() const noexcept { return source_; }
 
@@ -62,6 +68,8 @@ class Sensor : public net::SessionHost, public std::enable_shared_from_this<Sens
   net::Admission& admission_;
   net::SessionList session_list_;
   std::map<const net::Session*, Viewer> viewers_;
+  std::string status_;  ///< In JSON; empty: not known.
+  std::chrono::steady_clock::time_point status_asked_;
 };
 
 }  // namespace dtact::web

@@ -7,7 +7,6 @@
 
 #include "clients/web/names.hpp"
 #include "clients/web/token_query.hpp"
-#include "daemon/serve/change_log.hpp"
 #include "daemon/serve/security.hpp"
 #include "hal/base/utf8.hpp"
 #include "proto/framing.hpp"
@@ -60,7 +59,8 @@ Answer refusal_of(const net::Admission::Verdict& verdict) {
 }  // namespace
 
 Server::Server(asio::io_context& io, Settings settings, const Page& page)
-    : config_(net::checked(std::move(settings.net))),
+    : io_(io),
+      config_(net::checked(std::move(settings.net))),
       host_names_(std::move(settings.host_names)),
       foxglove_origins_(std::move(settings.foxglove_origins)),
       page_(page),
@@ -68,16 +68,13 @@ Server::Server(asio::io_context& io, Settings settings, const Page& page)
       certificate_watch_(io, config_, tls_),
       admission_(config_) {
   foxglove_origins_.emplace_back(kDesktop);
-  std::vector<guided::Calibrated> calibrated;
-  for (NamedDaemon& daemon : settings.daemons) {
-    const client::Options options = daemon.options;
+  for (cli::NamedDaemon& daemon : settings.daemons) {
     auto source = std::make_shared<Source>(io, daemon.name, std::move(daemon.options));
-    calibrated.push_back({source, options});
     sensors_.push_back(std::make_shared<Sensor>(io, std::move(source), config_, admission_));
   }
   foxglove_ = std::make_unique<foxglove::FoxgloveEndpoint>(sources(), config_, admission_);
   guided_ = std::make_unique<guided::GuidedEndpoint>(
-      std::move(calibrated), std::move(settings.work_folder), config_, admission_);
+      sources(), std::move(settings.work_folder), std::move(settings.taught), config_, admission_);
   listener_ = net::listen_tcp(io, config_, [this](asio::ip::tcp::socket socket, net::Peer peer) {
     auto ticket = limits_.admit(peer.host);
     serve_http(std::move(socket), std::move(peer), tls_ ? &tls_->context : nullptr,
@@ -93,6 +90,27 @@ void Server::start() {
   foxglove_->start();
   listener_->start();
   certificate_watch_.check();
+}
+
+void Server::add(const cli::Finder::Found& found) {
+  const cli::NamedDaemon& daemon = found.daemon;
+  const auto known = std::ranges::find_if(
+      sensors_, [&](const auto& one) { return one->source().name() == daemon.name; });
+  if (known != sensors_.end()) {
+    config_.log({net::LogLevel::info, fmt::format("{} is at {}:{} now", daemon.name,
+                                                  daemon.options.host, daemon.options.port)});
+    return (*known)->source().use(daemon.options);
+  }
+  config_.log({net::LogLevel::info, found.refused.empty()
+                                        ? fmt::format("found {} at {}:{}", daemon.name,
+                                                      daemon.options.host, daemon.options.port)
+                                        : found.refused});
+  auto source = std::make_shared<Source>(io_, daemon.name, daemon.options, found.refused);
+  guided_->add(source);
+  foxglove_->add(source);
+  sensors_.push_back(std::make_shared<Sensor>(io_, std::move(source), config_, admission_));
+  sensors_.back()->start();
+  sensors_.back()->source().start();
 }
 
 void Server::reload() {
@@ -126,10 +144,11 @@ bool Server::is_for_us(const Request& request) const {
   return is_own_host(field(request, http::field::host), host_names_);
 }
 
-Answer Server::answer(const Request& request) {
+Answer Server::answer(const Request& request, const net::Peer& peer) {
   if (!is_for_us(request)) return misdirected(request);
   const std::string_view path = path_of(request);
   if (path == "/sensors") return {.type = "application/json", .text = sensors()};
+  if (path == "/fleet") return fleet(request, peer);
   if (const Page::File* file = page_.find(path)) {
     return {.type = file->type, .bytes = file->bytes, .tag = file->tag};
   }
@@ -149,7 +168,7 @@ Upgrade Server::upgrade(const Request& request, const net::Peer& peer) {
   const std::vector<std::string> others = foxglove ? foxglove_origins_ : std::vector<std::string>{};
   // Only browsers say one; other programs may do all that the token lets them do.
   if (!origin.empty() && !is_own_origin(origin, host, tls_ != nullptr, others)) {
-    const std::string shown = net::printable(base::first_bytes(std::string(origin), kMaxShown));
+    const std::string shown = base::printable(base::first_bytes(std::string(origin), kMaxShown));
     std::string sentence = fmt::format("a page of {} may not look at this sensor", shown);
     if (foxglove) sentence += fmt::format(": start dtact-web with --foxglove-origin {}", shown);
     config_.log({net::LogLevel::warning, sentence, "", net::LogSubject::unauthenticated});
@@ -170,8 +189,9 @@ Upgrade Server::upgrade(const Request& request, const net::Peer& peer) {
                                "there is no such sensor: GET /sensors lists those there are")};
   }
   return {.max_message = wire::kMaxMessage + wire::kLengthSize,
-          .open = [sensor](std::shared_ptr<WebSocket> socket, net::Peer from) {
-            sensor->admit(std::move(socket), std::move(from));
+          .open = [sensor](std::shared_ptr<WebSocket> socket, net::Peer from,
+                           std::shared_ptr<void> place) {
+            sensor->admit(std::move(socket), std::move(from), std::move(place));
           }};
 }
 
@@ -181,7 +201,21 @@ std::string Server::sensors() const {
     text += text.empty() ? '[' : ',';
     text += sensor->entry();
   }
-  return text + ']';
+  return (text.empty() ? "[" : text) + ']';
+}
+
+/// Who asks comes again for what the daemons answer now.
+Answer Server::fleet(const Request& request, const net::Peer& peer) {
+  const std::string target(request.target().data(), request.target().size());
+  const auto verdict = admission_.judge(peer, token_of(target));
+  if (!verdict.grant) return refusal_of(verdict);
+  std::string text;
+  for (const auto& sensor : sensors_) {
+    text += text.empty() ? '[' : ',';
+    text += sensor->entry_with_status();
+    sensor->ask_status();
+  }
+  return {.type = "application/json", .text = (text.empty() ? "[" : text) + "]"};
 }
 
 std::vector<std::shared_ptr<Source>> Server::sources() const {

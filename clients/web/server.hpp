@@ -7,7 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "clients/cpp/options.hpp"
+#include "clients/common/avahi.hpp"
+#include "clients/common/daemon_option.hpp"
 #include "clients/web/foxglove/foxglove_endpoint.hpp"
 #include "clients/web/guided/guided_endpoint.hpp"
 #include "clients/web/http_connection.hpp"
@@ -21,15 +22,9 @@
 
 namespace dtact::web {
 
-/// A daemon behind the gateway, and what it is called there.
-struct NamedDaemon {
-  std::string name;
-  client::Options options;
-};
-
 struct Settings {
   net::NetConfig net;
-  std::vector<NamedDaemon> daemons;
+  std::vector<cli::NamedDaemon> daemons;
   /// By which browsers may name this machine, besides its addresses.
   std::vector<std::string> host_names;
   /// Origins that may open Foxglove's WebSocket besides our own and those of programs on the
@@ -37,6 +32,7 @@ struct Settings {
   std::vector<std::string> foxglove_origins;
   /// Below it guided calibrations save what they take.
   std::filesystem::path work_folder;
+  std::filesystem::path taught;  ///< Folder of the objects that pages teach.
 };
 
 /// dtact-web as a whole: the page, and a WebSocket for each daemon. All but the connections to the
@@ -48,6 +44,9 @@ class Server : public Site, public std::enable_shared_from_this<Server> {
   Server(boost::asio::io_context& io, Settings settings, const Page& page);
 
   void start();
+  /// A daemon that announced itself, after start(); of one whose name is known the address
+  /// is used from the next connection on.
+  void add(const cli::Finder::Found& found);
   void stop();
   /// Reads certificate, key and tokens again, and ends who has a token no more. Throws as the
   /// constructor, and changes nothing then.
@@ -57,15 +56,17 @@ class Server : public Site, public std::enable_shared_from_this<Server> {
   /// The TCP port it listens on.
   [[nodiscard]] std::uint16_t port() const { return listener_->port(); }
 
-  [[nodiscard]] Answer answer(const Request& request) override;
+  [[nodiscard]] Answer answer(const Request& request, const net::Peer& peer) override;
   [[nodiscard]] Upgrade upgrade(const Request& request, const net::Peer& peer) override;
 
  private:
   [[nodiscard]] bool is_for_us(const Request& request) const;
   [[nodiscard]] std::string sensors() const;
+  [[nodiscard]] Answer fleet(const Request& request, const net::Peer& peer);
   [[nodiscard]] std::shared_ptr<Sensor> find(std::string_view path) const;
   [[nodiscard]] std::vector<std::shared_ptr<Source>> sources() const;
 
+  boost::asio::io_context& io_;
   net::NetConfig config_;
   std::vector<std::string> host_names_;
   std::vector<std::string> foxglove_origins_;

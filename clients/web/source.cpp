@@ -20,7 +20,8 @@ constexpr std::size_t kCounted = std::size_t{64} * 1024;
 
 bool wants_frames(const v1::Subscribe& request) {
   return request.depth() != v1::DEPTH_NONE || request.luma() != v1::LUMA_NONE || request.jpeg() ||
-         request.summary() || request.cloud() != v1::CLOUD_NONE || request.pose();
+         request.summary() || request.cloud() != v1::CLOUD_NONE || request.pose() ||
+         request.recognition();
 }
 
 /// Requests that change nothing.
@@ -52,10 +53,15 @@ v1::Reply error_reply(v1::ErrorCode code, std::string sentence) {
   return reply;
 }
 
-Source::Source(asio::io_context& io, std::string name, client::Options daemon)
-    : io_(io), name_(std::move(name)), options_(std::move(daemon)) {}
+Source::Source(asio::io_context& io, std::string name, client::Options daemon, std::string refused)
+    : io_(io),
+      name_(std::move(name)),
+      options_(std::move(daemon)),
+      refused_(!refused.empty()),
+      reason_(refused_ ? std::move(refused) : "it has not answered yet") {}
 
 void Source::start() {
+  if (refused_) return;
   const auto on_io = [weak = weak_from_this(), &io = io_](auto call) {
     asio::post(io, [weak, call = std::move(call)]() mutable {
       const auto self = weak.lock();
@@ -79,6 +85,12 @@ void Source::start() {
                 if (!message.ParseFromString(bytes)) return;
                 on_io([message = std::move(message)](Source& self) { self.on_message(message); });
               }});
+}
+
+void Source::use(client::Options daemon) {
+  options_ = std::move(daemon);
+  if (link_ != nullptr) link_->use(options_);
+  for (const Stream& stream : streams_) stream.feed->use(options_);
 }
 
 void Source::stop() {

@@ -43,9 +43,14 @@ class Source : public std::enable_shared_from_this<Source> {
     std::function<void(const v1::ServerMessage&)> event;
   };
 
-  Source(boost::asio::io_context& io, std::string name, client::Options daemon);
+  /// `refused`: why the daemon is not to be connected to at all; empty: it is.
+  Source(boost::asio::io_context& io, std::string name, client::Options daemon,
+         std::string refused = "");
 
   void start();
+  /// Reaches the daemon so from the next connection on.
+  void use(client::Options daemon);
+  [[nodiscard]] const client::Options& options() const noexcept { return options_; }
   /// No callback is called afterwards.
   void stop();
   /// One for each `who`, until unfollow().
@@ -113,7 +118,8 @@ class Source : public std::enable_shared_from_this<Source> {
   std::map<const void*, Follower> followers_;
   std::unique_ptr<cli::Link> link_;
   bool connected_ = false;
-  std::string reason_ = "it has not answered yet";
+  bool refused_;
+  std::string reason_;
   std::optional<v1::HelloReply> daemon_;
   net::TokenBucket requests_{kMaxRequestsPerS, kMaxRequestsPerS};
   std::uint64_t next_id_ = 2;  ///< 1 was Hello's.

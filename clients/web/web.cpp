@@ -1,17 +1,18 @@
 #include "clients/web/web.hpp"
 
 #include <boost/asio/io_context.hpp>
+#include <boost/asio/post.hpp>
 #include <boost/asio/signal_set.hpp>
 #include <filesystem>
 #include <map>
 #include <memory>
 #include <optional>
 #include <ostream>
-#include <set>
-#include <stdexcept>
+#include <thread>
 
+#include "clients/common/avahi.hpp"
+#include "clients/common/daemon_option.hpp"
 #include "clients/common/listen_options.hpp"
-#include "clients/web/daemon_option.hpp"
 #include "clients/web/names.hpp"
 #include "clients/web/page.hpp"
 #include "clients/web/server.hpp"
@@ -25,28 +26,16 @@ namespace {
 struct Arguments {
   Settings settings;
   std::vector<std::string> daemons;
+  bool find = false;
   std::filesystem::path page;
   std::optional<net::Rights> anonymous_rights;
 };
 
-std::vector<NamedDaemon> daemons_of(const Arguments& arguments, const client::Options& common) {
-  if (arguments.daemons.empty()) return {{"sensor", common}};
-  std::vector<NamedDaemon> daemons;
-  daemons.reserve(arguments.daemons.size());
-  std::set<std::string> names;
-  for (const std::string& text : arguments.daemons) {
-    daemons.push_back(parse_daemon(text, common));
-    if (!names.insert(daemons.back().name).second) {
-      throw std::runtime_error("--daemon: two are named " + daemons.back().name +
-                               ": each needs a name of its own");
-    }
-  }
-  return daemons;
-}
-
 void serve(const cli::Context& context, const Arguments& arguments) {
   Settings settings = arguments.settings;
-  settings.daemons = daemons_of(arguments, context.target);
+  settings.daemons = cli::parse_daemons("--daemon", arguments.daemons, context.target);
+  if (settings.daemons.empty() && !arguments.find) settings.daemons = {{"sensor", context.target}};
+  if (settings.taught.empty()) settings.taught = settings.work_folder / "objects";
   for (std::string& name : machine_names()) settings.host_names.push_back(std::move(name));
   net::NetConfig& config = settings.net;
   config.program = "dtact-web " DTACT_VERSION;
@@ -72,6 +61,17 @@ void serve(const cli::Context& context, const Arguments& arguments) {
   boost::asio::signal_set hangups(io, SIGHUP);
   cli::reload_at_hangup(hangups, config.log, [&] { server->reload(); });
   server->start();
+  std::jthread finder;
+  if (arguments.find) {
+    finder = cli::watch_network(
+        context.target, settings.daemons,
+        [&](cli::Finder::Found found) {
+          boost::asio::post(io, [server, found = std::move(found)] { server->add(found); });
+        },
+        [&](const std::string& line) {
+          boost::asio::post(io, [&config, line] { config.log({net::LogLevel::warning, line}); });
+        });
+  }
   io.run();
 }
 
@@ -91,18 +91,8 @@ void set_up(CLI::App& app, cli::Context& context) {
   net.max_clients = 64;
   net.max_clients_per_address = 48;
   arguments->settings.work_folder = "dtact-calibrations";
-  CLI::Option* const daemons =
-      app.add_option("--daemon", arguments->daemons,
-                     "A daemon and its name on the page; behind the address, each after a comma, "
-                     "what it is connected to with: fingerprint=SHA256, ca-file=FILE, "
-                     "token-file=FILE, insecure. Without one it is that of --host, named sensor")
-          ->type_name("NAME=ADDRESS")
-          ->take_all();
-  // Those are about the one daemon of --host.
-  for (const char* one :
-       {"--host", "--port", "--token-file", "--fingerprint", "--ca-file", "--insecure"}) {
-    daemons->excludes(one);
-  }
+  cli::add_daemon_option(app, arguments->daemons, "on the page");
+  cli::add_find_option(app, arguments->find);
   cli::add_listen_options(app, net);
   CLI::CheckedTransformer rights(
       std::map<std::string, net::Rights>{{"view", net::Rights::view},
@@ -129,6 +119,10 @@ void set_up(CLI::App& app, cli::Context& context) {
       ->type_name("FOLDER")
       ->envname("STATE_DIRECTORY")
       ->capture_default_str();
+  app.add_option("--taught", arguments->settings.taught,
+                 "Folder of the objects that are taught on the page, the one that dtact-perceive "
+                 "serve --taught reads; by default objects below the --work-folder")
+      ->type_name("FOLDER");
   app.add_option("--page", arguments->page,
                  "Serve the files of this folder in place of the page that is built in")
       ->type_name("FOLDER");

@@ -8,8 +8,9 @@ namespace dtact::web {
 namespace asio = boost::asio;
 using boost::system::error_code;
 
-WireTransport::WireTransport(std::shared_ptr<WebSocket> socket, net::Peer peer)
-    : Transport(std::move(peer)), socket_(std::move(socket)) {}
+WireTransport::WireTransport(std::shared_ptr<WebSocket> socket, net::Peer peer,
+                             std::shared_ptr<void> place)
+    : Transport(std::move(peer)), socket_(std::move(socket)), place_(std::move(place)) {}
 
 void WireTransport::send_text(std::string text) {
   text_ = std::move(text);

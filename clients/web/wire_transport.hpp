@@ -14,11 +14,13 @@ namespace dtact::web {
 /// beside it, of which the newest is sent.
 class WireTransport : public net::Transport {
  public:
-  WireTransport(std::shared_ptr<WebSocket> socket, net::Peer peer);
+  /// `place`: see Upgrade::open.
+  WireTransport(std::shared_ptr<WebSocket> socket, net::Peer peer, std::shared_ptr<void> place);
 
   /// Sends a text as soon as what is being written is through, in place of one that waits.
   void send_text(std::string text);
 
+  void on_authenticated() override { place_.reset(); }
   void handshake(std::function<void(const boost::system::error_code&)> done) override { done({}); }
   void read_some(boost::asio::mutable_buffer into, Done done) override;
   void write(const Parts& parts, Done done) override;
@@ -30,6 +32,7 @@ class WireTransport : public net::Transport {
   void write_text();
 
   std::shared_ptr<WebSocket> socket_;  ///< Shared with a text on its way.
+  std::shared_ptr<void> place_;
   bool writing_ = false;
   std::optional<std::string> text_;  ///< Waits.
   std::function<void()> next_;       ///< What came while a text was being written.

@@ -9,6 +9,8 @@
 #include <exception>
 #include <utility>
 
+#include "hal/base/utf8.hpp"
+
 namespace dtact::web::foxglove {
 
 namespace asio = boost::asio;
@@ -18,6 +20,8 @@ namespace {
 
 constexpr int kWarning = 1;
 constexpr int kError = 2;
+/// Bytes that an answer repeats of what a client sent.
+constexpr std::size_t kMaxShown = 64;
 
 }  // namespace
 
@@ -103,7 +107,8 @@ void FoxgloveClient::take(bool text) {
   } else if (operation->name == "unsubscribe") {
     for (const std::uint32_t id : operation->ended) subscriptions_.erase(id);
   } else {
-    return send(status(kWarning, fmt::format("\"{}\" is not done here", operation->name)));
+    return send(status(kWarning, fmt::format("\"{}\" is not done here",
+                                             base::first_bytes(operation->name, kMaxShown))));
   }
   if (!closed_) update_want();
 }

@@ -54,6 +54,11 @@ void FoxgloveEndpoint::start() {
   for (const auto& sensor : sensors_) sensor->start();
 }
 
+void FoxgloveEndpoint::add(std::shared_ptr<Source> source) {
+  sensors_.push_back(std::make_shared<SensorTopics>(std::move(source)));
+  sensors_.back()->start();
+}
+
 void FoxgloveEndpoint::stop() {
   for (const auto& weak : std::exchange(clients_, {})) {
     if (const auto client = weak.lock()) client->close("dtact-web ends");
@@ -95,9 +100,8 @@ Upgrade FoxgloveEndpoint::upgrade(const Request& request) {
       .subprotocol = subprotocol,
       .max_message = kMaxMessage,
       .open = [this, mounts = mounts(target.substr(0, target.find('?'))), token = token_of(target)](
-                  std::shared_ptr<WebSocket> socket, const net::Peer& peer) {
-        admit(std::move(socket), peer, token, mounts);
-      }};
+                  std::shared_ptr<WebSocket> socket, const net::Peer& peer,
+                  const std::shared_ptr<void>&) { admit(std::move(socket), peer, token, mounts); }};
 }
 
 void FoxgloveEndpoint::admit(std::shared_ptr<WebSocket> socket, const net::Peer& peer,

@@ -21,6 +21,8 @@ class FoxgloveEndpoint {
                    const net::NetConfig& config, net::Admission& admission);
 
   void start();
+  /// Another sensor, after start().
+  void add(std::shared_ptr<Source> source);
   void stop();
   /// Ends the clients whose token was revoked or has other rights now.
   void end_revoked();

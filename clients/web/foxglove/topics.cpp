@@ -39,6 +39,7 @@ const std::array<TopicInfo, kTopics>& topics() {
       {Topic::jpeg, recording::kCameraTopic, ::foxglove::CompressedImage::descriptor()},
       {Topic::points, recording::kPointsTopic, ::foxglove::PointCloud::descriptor()},
       {Topic::pose, recording::kPoseTopic, ::foxglove::PoseInFrame::descriptor()},
+      {Topic::recognition, recording::kRecognitionTopic, v1::Recognition::descriptor()},
       {Topic::transforms, recording::kTransformsTopic, ::foxglove::FrameTransforms::descriptor()},
   }};
   return all;
@@ -47,14 +48,14 @@ const std::array<TopicInfo, kTopics>& topics() {
 Topics served_by(const std::optional<v1::HelloReply>& daemon) {
   Topics served;
   if (daemon && std::ranges::count(daemon->features(), "cloud") > 0) {
-    for (const Topic topic :
-         {Topic::summary, Topic::contact, Topic::points, Topic::pose, Topic::transforms}) {
+    for (const Topic topic : {Topic::summary, Topic::contact, Topic::points, Topic::pose,
+                              Topic::recognition, Topic::transforms}) {
       served.set(index(topic));
     }
     return served;
   }
   served.set();
-  for (const Topic topic : {Topic::points, Topic::pose, Topic::transforms}) {
+  for (const Topic topic : {Topic::points, Topic::pose, Topic::recognition, Topic::transforms}) {
     served.reset(index(topic));
   }
   return served;
@@ -88,6 +89,10 @@ v1::Subscribe subscription_for(Topics wanted) {
     request.set_pose(true);
     request.set_pose_hz(kMaxHz);
   }
+  if (wants(Topic::recognition)) {
+    request.set_recognition(true);
+    request.set_recognition_hz(kMaxHz);
+  }
   // Points also with the frame in which the contact has ended.
   if (wants(Topic::points) || wants(Topic::frame) || wants(Topic::summary) ||
       wants(Topic::contact) || wants(Topic::light)) {
@@ -116,6 +121,8 @@ std::shared_ptr<const Message> message_of(Topic topic, const v1::Frame& frame) {
       return frame.has_cloud() ? made(frame, recording::point_cloud(frame, time_ns)) : nullptr;
     case Topic::pose:
       return frame.pose().valid() ? made(frame, recording::pose_in_frame(frame, time_ns)) : nullptr;
+    case Topic::recognition:
+      return frame.has_recognition() ? made(frame, frame.recognition()) : nullptr;
     case Topic::transforms:
       return frame.pose().valid() ? made(frame, recording::transforms(frame, time_ns)) : nullptr;
     case Topic::light:

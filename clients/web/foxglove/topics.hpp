@@ -26,9 +26,10 @@ enum class Topic : std::uint8_t {
   jpeg,
   points,
   pose,
+  recognition,
   transforms
 };
-inline constexpr std::size_t kTopics = 11;
+inline constexpr std::size_t kTopics = 12;
 using Topics = std::bitset<kTopics>;
 
 struct TopicInfo {
@@ -44,7 +45,8 @@ inline constexpr std::size_t index(Topic topic) { return static_cast<std::size_t
 /// Frames a second of each channel, at most.
 inline constexpr double kMaxHz = 60;
 
-/// What a daemon has messages of: dtactd maps and pictures, dtact-perceive points and poses. None:
+/// What a daemon has messages of: dtactd maps and pictures, dtact-perceive points, poses and
+/// recognition. None:
 /// one that was never there, which is taken for dtactd.
 [[nodiscard]] Topics served_by(const std::optional<v1::HelloReply>& daemon);
 

@@ -5,32 +5,33 @@
 #include <memory>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
-#include "clients/cpp/options.hpp"
 #include "clients/web/guided/relay.hpp"
 #include "clients/web/request.hpp"
 #include "clients/web/source.hpp"
 #include "daemon/serve/admission.hpp"
 #include "daemon/serve/net_config.hpp"
 
+namespace dtact::cli {
+class GuidedStart;
+}
+
 namespace dtact::web::guided {
 
-/// A sensor that may be calibrated.
-struct Calibrated {
-  std::shared_ptr<Source> source;
-  client::Options options;  ///< How its daemon is reached.
-};
-
-/// Serves /sensors/NAME/calibrate: one session of each sensor at a time. On the thread that
-/// runs the gateway's `io`.
+/// Serves /sensors/NAME/calibrate: guided calibrations and the teaching of objects, one session of
+/// each sensor at a time, and a few that need no sensor. On the thread that runs the gateway's
+/// `io`.
 class GuidedEndpoint {
  public:
-  /// `work`: below it each session saves what it takes. What is passed by reference must outlive
-  /// this.
-  GuidedEndpoint(std::vector<Calibrated> sensors, std::filesystem::path work,
-                 const net::NetConfig& config, net::Admission& admission);
+  /// `work`: below it each calibration saves what it takes; `taught`: folder of taught objects.
+  /// What is passed by reference must outlive this.
+  GuidedEndpoint(std::vector<std::shared_ptr<Source>> sensors, std::filesystem::path work,
+                 std::filesystem::path taught, const net::NetConfig& config,
+                 net::Admission& admission);
 
+  void add(std::shared_ptr<Source> sensor) { sensors_.push_back(std::move(sensor)); }
   void stop();
   /// Ends the sessions whose token was revoked or has other rights now.
   void end_revoked();
@@ -39,16 +40,17 @@ class GuidedEndpoint {
   [[nodiscard]] Upgrade upgrade(std::string_view path, std::string token);
 
  private:
-  [[nodiscard]] const Calibrated* find(std::string_view path) const;
-  void admit(const Calibrated& sensor, std::shared_ptr<WebSocket> socket, const net::Peer& peer,
+  [[nodiscard]] Source* find(std::string_view path) const;
+  void admit(const Source& sensor, std::shared_ptr<WebSocket> socket, const net::Peer& peer,
              const std::string& token);
   /// dtact-calibrate as the page's first message wants it. Throws std::exception with a sentence
   /// for the page.
-  [[nodiscard]] std::shared_ptr<Child> begin(const Calibrated& sensor, const std::string& start,
+  [[nodiscard]] std::shared_ptr<Child> begin(const Source& sensor, const cli::GuidedStart& start,
                                              Relay& relay, Child::Handlers handlers);
 
-  std::vector<Calibrated> sensors_;
+  std::vector<std::shared_ptr<Source>> sensors_;
   std::filesystem::path work_;
+  std::filesystem::path taught_;
   const net::NetConfig& config_;
   net::Admission& admission_;
   struct Open {
@@ -57,6 +59,7 @@ class GuidedEndpoint {
   };
   std::vector<Open> relays_;
   std::map<std::string, std::weak_ptr<Child>> children_;  ///< By the sensor's name.
+  std::vector<std::weak_ptr<Child>> without_sensor_;
 };
 
 }  // namespace dtact::web::guided

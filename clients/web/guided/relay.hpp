@@ -12,8 +12,8 @@
 
 namespace dtact::web::guided {
 
-/// One guided calibration: a page's WebSocket and dtact-calibrate, which is ended with it. Both
-/// speak clients/common/guided.proto in JSON. On one thread.
+/// One session of GuidedEndpoint: a page's WebSocket and dtact-calibrate, which is ended with it.
+/// Both speak clients/common/guided.proto in JSON. On one thread.
 class Relay : public std::enable_shared_from_this<Relay> {
  public:
   /// The WebSocket lets no longer message through, bytes.

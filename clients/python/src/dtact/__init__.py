@@ -47,9 +47,12 @@ from .subscription import Subscription
 from .values import (
     CalibrationFiles,
     CalibrationSummary,
+    CameraSetting,
+    CameraSettings,
     Contact,
     Light,
     Pong,
+    Recognition,
     Reconstruction,
     ReferenceImage,
     Server,
@@ -61,11 +64,11 @@ from .values import (
 connect = Client
 
 __all__ = [
-    "Busy", "CalibrationEvent", "CalibrationFiles", "CalibrationSummary", "Camera", "Client",
-    "ConnectionError", "Contact", "ContactEvent", "Denied", "DeviceFailed", "EndedByDaemon",
+    "Busy", "CalibrationEvent", "CalibrationFiles", "CalibrationSummary", "Camera", "CameraSetting",
+    "CameraSettings", "Client", "ConnectionError", "Contact", "ContactEvent", "Denied", "DeviceFailed", "EndedByDaemon",
     "Error", "Event", "Frame", "IdentityError", "InContact", "Invalid", "Light", "LightEvent", "NoFrame",
-    "NotInFrame", "ObjectPose", "PointCloud", "Pong", "ProtocolError", "Reconnected",
-    "Reconstruction", "ReconstructionEvent", "Recording", "ReferenceEvent", "ReferenceImage",
+    "NotInFrame", "ObjectPose", "PointCloud", "Pong", "ProtocolError", "Recognition",
+    "Reconnected", "Reconstruction", "ReconstructionEvent", "Recording", "ReferenceEvent", "ReferenceImage",
     "Refused", "Server", "SharedClient", "StateEvent", "Status", "StorageFailed", "StoredCalibration",
     "Subscription", "Surface", "TimeoutError", "Uncalibrated", "Unsupported", "aio", "connect",
     "read",

@@ -28,6 +28,7 @@ from .subscription import Subscription
 from .transport import ATTEMPT_DELAY_S, is_local, tune
 from .values import (
     CalibrationFiles,
+    CameraSettings,
     Light,
     Pong,
     Reconstruction,
@@ -179,6 +180,10 @@ class Client(Session):
     async def set_light(self, brightness: int | None = None, scheme: str | None = None,
                         leds: Sequence[tuple[int, int, int]] | None = None) -> Light:
         return await self._ask(requests.set_light(brightness, scheme, leds))
+
+    async def set_camera(self, exposure_us: float | None = None,
+                         gain: float | None = None) -> CameraSettings:
+        return await self._ask(requests.set_camera(exposure_us, gain))
 
     async def set_reconstruction(self, resolution: str | None = None, sharpen: str | None = None,
                                  max_error_um: float | None = None) -> Reconstruction:

@@ -22,6 +22,7 @@ from .subscription import Subscription
 from .transport import Link
 from .values import (
     CalibrationFiles,
+    CameraSettings,
     Light,
     Pong,
     Reconstruction,
@@ -106,6 +107,11 @@ class Client(Session):
         """Changes the ring and returns once it shows it; what is left out stays. `brightness`:
         0 … 255. `scheme`: "all", "scheme1" … "scheme4". `leds`: eight colours (r, g, b)."""
         return self._ask(requests.set_light(brightness, scheme, leds))
+
+    def set_camera(self, exposure_us: float | None = None, gain: float | None = None) -> CameraSettings:
+        """Exposure and gain of the camera until the daemon ends; what is left out stays. The reference
+        is taken anew. Returns both with their ranges."""
+        return self._ask(requests.set_camera(exposure_us, gain))
 
     def set_reconstruction(self, resolution: str | None = None, sharpen: str | None = None,
                            max_error_um: float | None = None) -> Reconstruction:

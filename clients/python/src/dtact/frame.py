@@ -11,7 +11,7 @@ from .encodings import depth_values
 from .errors import NotInFrame, ProtocolError
 from .geometry import ObjectPose, PointCloud, Surface
 from .messages import Message, name_of
-from .values import Contact, Light, health_names, wall_time
+from .values import Contact, Light, Recognition, health_names, wall_time
 
 
 @lru_cache(maxsize=8)
@@ -138,7 +138,8 @@ class Frame:
             raise NotInFrame(f"the gel's surface is a {self.surface.shape}: connect to dtact-perceive, "
                              "which makes its points (Subscription(cloud=...))")
         return PointCloud.of_plane(self.depth_mm, self.mm_per_px, self.origin_px,
-                                   (depth.full_height, depth.full_width), self.decimation)
+                                   (depth.full_height, depth.full_width), self.decimation,
+                                   self.surface)
 
     # ------------------------------------------------------------ pictures
 
@@ -174,8 +175,8 @@ class Frame:
 
     @cached_property
     def surface(self) -> Surface:
-        """The undeformed gel's, along whose normal depth is; a plane unless the calibration says
-        otherwise. A frame without depth does not say."""
+        """The undeformed gel's, along whose normal depth is, and where the camera stands; a plane unless
+        the calibration says otherwise. A frame without depth does not say."""
         return Surface.of(self.message.surface)
 
     # ------------------------------------------------------------ of dtact-perceive
@@ -198,6 +199,14 @@ class Frame:
         """Motion of the object in contact. None when not subscribed, without contact, and until the
         contact is about half a square millimetre large."""
         return ObjectPose.of(self.message.pose) if self.message.HasField("pose") else None
+
+    @cached_property
+    def recognition(self) -> Recognition | None:
+        """What the object in contact is. None when not subscribed, without contact, and until the first
+        answer."""
+        if not self.message.HasField("recognition"):
+            return None
+        return Recognition.of(self.message.recognition)
 
     # ------------------------------------------------------------ what was measured
 

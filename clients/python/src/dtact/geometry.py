@@ -44,14 +44,24 @@ class Surface:
     air_mm: float = 0.0  #: from the camera's pinhole to the gel
     gel_mm: float = 0.0  #: from there to the surface's origin
     refraction: float = 1.0  #: of the gel
+    foot_mm: tuple[float, float] = (0.0, 0.0)  #: of a plane: of the camera's axis
+    per_mm: float = 0.0  #: of a plane: 1 / the camera's height above it; 0: unknown
 
     @classmethod
     def of(cls, m: Message) -> Surface:
         shape = name_of("Surface.Shape", m.shape, "")
         if shape == "plane":
-            return cls(shape)
+            return cls(shape, foot_mm=(float(m.foot_x_mm), float(m.foot_y_mm)),
+                       per_mm=float(m.per_mm))
         return cls(shape, float(m.radius_mm), float(m.axis_deg), float(m.air_mm), float(m.gel_mm),
                    float(m.refraction))
+
+    def place(self, x_mm: Any, y_mm: Any, depth_mm: Any) -> tuple[Any, Any]:
+        """Where a point of a plane lies that a depth map shows at (x, y) and that is pressed in: nearer
+        to the camera, it appears farther from the foot of the camera's axis than it is. Millimetres,
+        surface frame; numbers or arrays."""
+        share = self.per_mm * depth_mm
+        return x_mm - share * (x_mm - self.foot_mm[0]), y_mm - share * (y_mm - self.foot_mm[1])
 
 
 @dataclass(frozen=True)
@@ -82,18 +92,25 @@ class PointCloud:
 
     @classmethod
     def of_plane(cls, depth_mm: NDArray[np.float32], mm_per_px: float, origin_px: tuple[int, int],
-                 full_shape: tuple[int, int], decimation: int) -> PointCloud:
-        """Of a depth map of a flat gel: the columns and rows from `origin_px` of a map of `full_shape`.
-        Normals are taken over 0.16 mm on both sides, or to the last trusted pixel."""
+                 full_shape: tuple[int, int], decimation: int,
+                 surface: Surface = Surface("plane")) -> PointCloud:
+        """Of a depth map of a flat gel: the columns and rows from `origin_px` of a map of `full_shape`,
+        at their true places. Normals are taken over 0.16 mm on both sides, or to the last trusted pixel."""
         height, width = depth_mm.shape
         columns = origin_px[0] + np.arange(width) - 0.5 * (full_shape[1] - 1)
         rows = origin_px[1] + np.arange(height) - 0.5 * (full_shape[0] - 1)
         reach = max(1, round(_REACH_MM / mm_per_px))
         slope_x = _slope(depth_mm, mm_per_px, reach)
         slope_y = _slope(depth_mm.T, mm_per_px, reach).T
-        normals = np.stack([slope_x, slope_y, np.ones_like(slope_x)], axis=-1)
+        x, y = np.meshgrid(columns * mm_per_px, rows * mm_per_px)
+        # With the slopes in places as they appear, the surface has the tangents
+        # (rest − leans_x slope_x, −leans_y slope_x, −slope_x) and (−leans_x slope_y, rest − leans_y slope_y,
+        # −slope_y); this is their cross product over rest.
+        leans_x, leans_y = (surface.per_mm * (at - foot) for at, foot in zip((x, y), surface.foot_mm))
+        rest = 1 - surface.per_mm * depth_mm
+        normals = np.stack([slope_x, slope_y, rest - leans_x * slope_x - leans_y * slope_y], axis=-1)
         normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
-        points = np.stack([*np.meshgrid(columns * mm_per_px, rows * mm_per_px), -depth_mm], axis=-1)
+        points = np.stack([*surface.place(x, y, depth_mm), -depth_mm], axis=-1)
         points[np.isnan(normals[..., 2])] = np.nan
         return cls((points * 1e-3).astype(np.float32), normals.astype(np.float32), decimation)
 

@@ -8,6 +8,7 @@ from .messages import ClientMessage, Message
 from .subscription import Subscription
 from .values import (
     CalibrationFiles,
+    CameraSettings,
     Light,
     Pong,
     Reconstruction,
@@ -77,6 +78,17 @@ def set_light(brightness: int | None, scheme: str | None,
     for r, g, b in leds or ():
         request.leds.add(r=r, g=g, b=b)
     return Request(message, lambda reply: Light.of(reply.light))
+
+
+def set_camera(exposure_us: float | None, gain: float | None) -> Request[CameraSettings]:
+    message = ClientMessage()
+    request = message.set_camera
+    request.SetInParent()
+    if exposure_us is not None:
+        request.exposure_us = exposure_us
+    if gain is not None:
+        request.gain = gain
+    return Request(message, lambda reply: CameraSettings.of(reply.camera))
 
 
 def set_reconstruction(resolution: str | None, sharpen: str | None,

@@ -276,10 +276,11 @@ def read_token(file: Path) -> str:
     if status.st_mode & _others(file, status):
         raise Error(f"{file} can be read by others: chmod 600 {file}")
     token = lines[0].rstrip() if lines else ""
-    # The daemon's own file has lines like "control TOKEN NAME".
+    # The daemon's own file has lines like "control HASH NAME".
     if not 1 <= len(token.encode()) <= _MAX_TOKEN_BYTES or " " in token:
         raise Error(f"the first line of {file} is no token: it has 1 to {_MAX_TOKEN_BYTES} bytes "
-                    "and no blanks. Of a line for the daemon (dtactctl token) it is the second word")
+                    "and no blanks. A line for the daemon has only its hash: the token is in "
+                    "the file of dtactctl token -o")
     return token
 
 

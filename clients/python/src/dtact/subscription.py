@@ -36,6 +36,9 @@ class Subscription:
     cloud_hz: float = 0.0
     pose: bool = False  #: motion of the object in contact, from dtact-perceive
     pose_hz: float = 0.0
+    recognition: bool = False  #: what the object in contact is, from dtact-perceive
+    recognition_hz: float = 0.0
+    recognition_presses: int = 1  #: contacts with one object to join in an answer, at most 10
 
     def message(self, same_machine: bool) -> Message:
         """The request. ValueError for an encoding that is no Encoding."""
@@ -67,6 +70,9 @@ class Subscription:
         request.cloud_hz = self.cloud_hz
         request.pose = self.pose
         request.pose_hz = self.pose_hz
+        request.recognition = self.recognition
+        request.recognition_hz = self.recognition_hz
+        request.recognition_presses = self.recognition_presses
         return request
 
     def _constant(self, same_machine: bool) -> str:

@@ -54,6 +54,41 @@ class Contact:
 
 
 @dataclass(frozen=True)
+class Candidate:
+    """An object that a contact may be of."""
+
+    name: str
+    probability: float
+    taught: bool  #: by a user; else built in
+
+
+@dataclass(frozen=True)
+class Recognition:
+    """What the object in contact is, as far as dtact-perceive knows."""
+
+    #: "known" (the first candidate), "unknown" (none of them), "unsure", "too_shallow" or "cut_off"
+    verdict: str
+    candidates: tuple[Candidate, ...]  #: most probable first, whatever the verdict
+    score: float  #: probability that it is a known object at all
+    presses: int  #: contacts joined; 0: none is deep enough
+    model: str  #: SHA-256 of the network's weights
+    sequence: int  #: the last frame of it
+    computed_in_s: float
+
+    @property
+    def name(self) -> str | None:
+        """The object's name when it is known."""
+        return self.candidates[0].name if self.verdict == "known" else None
+
+    @classmethod
+    def of(cls, m: Message) -> Recognition:
+        return cls(name_of("Recognition.Verdict", m.verdict, ""),
+                   tuple(Candidate(str(c.name), float(c.probability), bool(c.taught))
+                         for c in m.candidates),
+                   float(m.score), int(m.presses), str(m.model), int(m.sequence), m.took_ns * 1e-9)
+
+
+@dataclass(frozen=True)
 class Light:
     """The ring."""
 
@@ -80,6 +115,31 @@ class Reconstruction:
     @classmethod
     def of(cls, m: Message) -> Reconstruction:
         return cls(m.resolution, m.sharpen, m.max_error_um)
+
+
+@dataclass(frozen=True)
+class CameraSetting:
+    """A number that can be changed while the camera runs."""
+
+    value: float
+    minimum: float
+    maximum: float
+
+
+@dataclass(frozen=True)
+class CameraSettings:
+    """What can be changed of the camera; None where it has no such control."""
+
+    exposure_us: CameraSetting | None
+    gain: CameraSetting | None  #: in the camera's own unit
+
+    @classmethod
+    def of(cls, m: Message) -> CameraSettings:
+        def setting(name: str) -> CameraSetting | None:
+            one = getattr(m, name)
+            return CameraSetting(one.value, one.minimum, one.maximum) if m.HasField(name) else None
+
+        return cls(setting("exposure_us"), setting("gain"))
 
 
 @dataclass(frozen=True)
@@ -172,6 +232,7 @@ class Status:
 
     state: str  #: "settling", "referencing", "serving", "uncalibrated", "camera_lost"
     health: tuple[str, ...]
+    fixes: dict[str, str]  #: for each flag of health: what it means and its fix
     advice: str  #: what to do about state and health; empty when all is well
     fps: float  #: over the last second
     light: Light
@@ -179,13 +240,16 @@ class Status:
     version: str
     message: Message
     reconstruction: Reconstruction | None  #: None if the daemon does not report it
+    board_celsius: float | None  #: of the daemon's computer; None where its kernel does not know it
 
     @classmethod
     def of(cls, m: Message) -> Status:
         calibration = CalibrationSummary.of(m.calibration) if m.HasField("calibration") else None
-        return cls(name_of("State", m.state), health_names(m.health), m.advice, m.fps,
+        health = health_names(m.health)
+        return cls(name_of("State", m.state), health, dict(zip(health, m.fixes)), m.advice, m.fps,
                    Light.of(m.light), calibration, m.version, m,
-                   Reconstruction.of(m.reconstruction) if m.HasField("reconstruction") else None)
+                   Reconstruction.of(m.reconstruction) if m.HasField("reconstruction") else None,
+                   m.board_celsius if m.HasField("board_celsius") else None)
 
 
 @dataclass(frozen=True)

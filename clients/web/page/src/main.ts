@@ -2,6 +2,7 @@
 import "uplot/dist/uPlot.min.css";
 import "./page.css";
 import { button, el, say } from "./dom";
+import { Fleet } from "./fleet";
 import { keep, kept } from "./kept";
 import { Pane } from "./pane";
 
@@ -20,10 +21,27 @@ class Page {
   private readonly notice = el("p", { class: "notice", role: "status", hidden: "" });
   private readonly panes = el("main", { class: "panes" });
   private readonly help = this.makeHelp();
+  private readonly picker = el("input", {
+    type: "file",
+    accept: ".mcap",
+    hidden: "",
+    "aria-label": "Recording",
+  });
+  private readonly fleet = new Fleet(
+    (name) => this.open(name),
+    (name) => this.shown.has(name),
+  );
+  private readonly fleetButton = button("Fleet", () => this.showFleet(), {
+    title: "All sensors with state, rate and health",
+    "aria-pressed": "false",
+    hidden: "",
+  });
   private readonly shown = new Map<string, Pane>();
   private readonly buttons = new Map<string, HTMLButtonElement>();
   /** The pane that receives keys: the one used last. */
   private active = "";
+  /** Recordings opened so far. */
+  private played = 0;
 
   constructor() {
     document.body.append(
@@ -31,10 +49,15 @@ class Page {
         "header",
         { class: "top" },
         el("h1", {}, "dtact"),
+        this.fleetButton,
         this.chooser,
         el(
           "span",
           { class: "row end" },
+          button("Open recording…", () => this.picker.click(), {
+            title: "An MCAP file of dtactctl record or of this page",
+          }),
+          this.picker,
           button("Keys", () => this.help.showModal(), { title: "?" }),
           button("Light / dark", () => this.switchTheme(), {
             title: "Switch between light and dark",
@@ -42,12 +65,18 @@ class Page {
         ),
       ),
       this.notice,
+      this.fleet.element,
       this.panes,
       this.help,
     );
     const theme = kept(THEME);
     if (theme === "dark" || theme === "light") document.documentElement.dataset["theme"] = theme;
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.recolour());
+    this.picker.addEventListener("change", () => {
+      const file = this.picker.files?.[0];
+      if (file) this.play(file);
+      this.picker.value = "";
+    });
     document.addEventListener("keydown", (event) => this.key(event));
     void this.poll();
     setInterval(() => void this.poll(), POLL_MS);
@@ -57,8 +86,8 @@ class Page {
     try {
       const response = await fetch("sensors", { cache: "no-store" });
       if (!response.ok) throw new Error(`status ${response.status}`);
-      this.list((await response.json()) as SensorEntry[]);
       this.tell("");
+      this.list((await response.json()) as SensorEntry[]);
     } catch (error) {
       this.tell(`dtact-web does not answer (${(error as Error).message}). Trying again.`);
     }
@@ -89,7 +118,20 @@ class Page {
     }
     if (fresh) for (const name of first) this.toggle(name);
     if (sensors.length === 0) this.tell("dtact-web has no sensor: see its --help.");
-    this.chooser.hidden = sensors.length < 2;
+    this.fleetButton.hidden = sensors.length < 2;
+    this.chooser.hidden = sensors.length < 2 || this.fleet.shown;
+  }
+
+  /** The fleet's list in place of the chooser, and back. */
+  private showFleet(): void {
+    this.fleet.toggle();
+    this.chooser.hidden = this.fleet.shown;
+    this.fleetButton.setAttribute("aria-pressed", String(this.fleet.shown));
+  }
+
+  private open(name: string): void {
+    this.choose(name);
+    this.shown.get(name)?.element.scrollIntoView({ behavior: "smooth" });
   }
 
   private choose(name: string): void {
@@ -105,18 +147,41 @@ class Page {
       this.shown.delete(name);
     } else {
       try {
-        const pane = new Pane(name);
-        this.shown.set(name, pane);
-        this.panes.append(pane.element);
-        pane.start();
-        pane.element.addEventListener("pointerdown", () => (this.active = name));
-        pane.element.addEventListener("focusin", () => (this.active = name));
+        this.add(name, new Pane(name), null);
       } catch (error) {
         this.panes.append(el("p", { class: "notice", role: "alert" }, (error as Error).message));
       }
     }
-    this.panes.dataset["count"] = String(this.shown.size);
+    this.count();
     this.buttons.get(name)?.setAttribute("aria-pressed", String(this.shown.has(name)));
+  }
+
+  /** A recording in a pane of its own, above the sensors'. */
+  private play(file: File): void {
+    const name = `${file.name} ${++this.played}`;
+    const pane = new Pane(file.name, file);
+    const close = button("Close", () => {
+      this.shown.delete(name);
+      this.count();
+      void pane.close();
+    });
+    pane.element.querySelector(".panehead")?.append(close);
+    this.add(name, pane, this.panes.firstChild);
+    pane.element.scrollIntoView();
+  }
+
+  private add(name: string, pane: Pane, before: Node | null): void {
+    this.shown.set(name, pane);
+    this.panes.insertBefore(pane.element, before);
+    pane.start();
+    pane.element.addEventListener("pointerdown", () => (this.active = name));
+    pane.element.addEventListener("focusin", () => (this.active = name));
+    this.active = name;
+    this.count();
+  }
+
+  private count(): void {
+    this.panes.dataset["count"] = String(this.shown.size);
   }
 
   private key(event: KeyboardEvent): void {
@@ -132,7 +197,7 @@ class Page {
 
   private makeHelp(): HTMLDialogElement {
     const keys: [string, string][] = [
-      ["1 2 3", "depth, camera, surface"],
+      ["1 2 3 4", "depth, camera, surface, camera − reference"],
       ["P L", "point, line from A to B"],
       ["arrows on the map", "move the cursor; with Shift by ten"],
       ["+ − 0 on the map", "zoom; also by the wheel or two fingers, a drag moves the map"],

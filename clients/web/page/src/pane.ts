@@ -1,22 +1,27 @@
 // One sensor: its picture, its panels, and what its connection says.
-import { State } from "../gen/dtact_pb";
+import { create } from "@bufbuild/protobuf";
+import { GetReferenceSchema, State } from "../gen/dtact_pb";
 import type { Event, HelloReply, Status } from "../gen/dtact_pb";
 import { button, Choice, el, say } from "./dom";
 import { Meter } from "./meter";
 import { CalibrationsPanel } from "./panels/calibrations";
+import { CameraPanel } from "./panels/camera";
 import { ContactPanel } from "./panels/contact";
 import { LightPanel } from "./panels/light";
+import { ObjectsPanel } from "./panels/objects";
 import { Plots, ProfilePlot } from "./panels/plots";
 import { QualityPanel } from "./panels/quality";
 import { ReconstructionPanel } from "./panels/reconstruction";
+import type { Played } from "./recording/player";
 import { RecordButton } from "./record_button";
 import type { Frame, Link, Wants } from "./session/messages";
 import { Sensor } from "./session/sensor";
+import { Timeline } from "./timeline";
 import { saveSnapshot } from "./snapshot";
 import type { CloudView } from "./surface/cloud";
 import type { SurfaceView } from "./surface/surface";
 import { RangeForm } from "./view/range_form";
-import { Stage } from "./view/stage";
+import { isPicture, Stage } from "./view/stage";
 import type { Tool, View } from "./view/stage";
 import { fixed } from "./labels";
 
@@ -35,7 +40,9 @@ export class Pane {
   private readonly contact = new ContactPanel();
   private readonly quality = new QualityPanel();
   private readonly light: LightPanel;
+  private readonly camera: CameraPanel;
   private readonly calibrations: CalibrationsPanel;
+  private readonly objects: ObjectsPanel;
   private readonly reconstruction: ReconstructionPanel;
   private readonly recording: RecordButton;
   private readonly plots = new Plots();
@@ -51,6 +58,7 @@ export class Pane {
   private readonly snapshotButton = button("Snapshot", () => void this.snapshot(), {
     title: "A PNG with time and settings (S)",
   });
+  private readonly timeline = new Timeline(this.pauseButton, (seconds) => this.sensor.seek(seconds));
   private readonly steps = el("span", { class: "row steps", hidden: "" });
   private readonly behind = el("span", { class: "quiet" });
   private readonly range: RangeForm;
@@ -66,15 +74,18 @@ export class Pane {
   private paused = false;
   private reportedAt = 0;
 
-  /** Throws where the browser has no WebGL 2. */
-  constructor(readonly name: string) {
+  /** Of a sensor, or of a recording named so. Throws where the browser has no WebGL 2. */
+  constructor(
+    readonly name: string,
+    private readonly file?: File,
+  ) {
     this.range = new RangeForm(name, (range, outlineMm) => {
       if (range) this.stage.range = range;
       if (outlineMm !== undefined) this.stage.outlineMm = outlineMm;
     });
     this.views = new Choice<View>(
       "View",
-      { depth: "Depth", camera: "Camera", surface: "Surface" },
+      { depth: "Depth", camera: "Camera", difference: "Difference", surface: "Surface" },
       "depth",
       (view) => void this.look(view),
     );
@@ -88,9 +99,12 @@ export class Pane {
       event: (event) => this.event(event),
       status: (status) => this.status(status),
       recorded: (recorded) => this.recording.tell(recorded),
-    });
+      played: (played) => this.played(played),
+    }, file);
     this.light = new LightPanel(this.sensor);
-    this.calibrations = new CalibrationsPanel(this.sensor);
+    this.camera = new CameraPanel(this.sensor);
+    this.calibrations = new CalibrationsPanel(this.sensor, () => this.stage.cameraLine);
+    this.objects = new ObjectsPanel(this.sensor);
     this.reconstruction = new ReconstructionPanel(this.sensor);
     this.recording = new RecordButton(this.sensor);
     this.steps.append(
@@ -129,6 +143,7 @@ export class Pane {
       "1": () => this.views.choose("depth"),
       "2": () => this.views.choose("camera"),
       "3": () => this.views.choose("surface"),
+      "4": () => this.views.choose("difference"),
       p: () => this.tools.choose("point"),
       l: () => this.tools.choose("line"),
       s: () => void this.snapshot(),
@@ -158,9 +173,9 @@ export class Pane {
         "span",
         { class: "row" },
         this.steps,
-        this.pauseButton,
+        this.file ? "" : this.pauseButton,
         this.snapshotButton,
-        this.recording.element,
+        this.file ? "" : this.recording.element,
       ),
     );
     const tools = el(
@@ -172,12 +187,18 @@ export class Pane {
     );
     this.commands.append(
       this.light.element,
+      this.camera.element,
       this.reconstruction.element,
       this.calibrations.element,
+      this.objects.element,
     );
     return el(
       "article",
-      { class: "pane", "aria-label": `Sensor ${this.name}`, "data-sensor": this.name },
+      {
+        class: "pane",
+        "aria-label": `${this.file ? "Recording" : "Sensor"} ${this.name}`,
+        [this.file ? "data-recording" : "data-sensor"]: this.name,
+      },
       el(
         "div",
         { class: "frame" },
@@ -187,7 +208,7 @@ export class Pane {
         el(
           "div",
           { class: "body" },
-          el("div", { class: "main" }, tools, this.stage.element),
+          el("div", { class: "main" }, tools, this.stage.element, this.file ? this.timeline.element : ""),
           this.profile.element,
           el("div", { class: "side" }, this.contact.element, this.quality.element),
           this.commands,
@@ -216,12 +237,14 @@ export class Pane {
   }
 
   private wants(): Wants {
-    return { depth: this.views.value !== "camera", luma: this.views.value === "camera" };
+    const picture = isPicture(this.views.value);
+    return { depth: !picture, luma: picture };
   }
 
   private async look(view: View): Promise<void> {
     this.stage.look(view);
     this.sensor.want(this.wants());
+    if (view === "difference") void this.fetchReference();
     if (view !== "surface") return;
     if (!this.surface) {
       const { SurfaceView } = await import("./surface/surface");
@@ -229,6 +252,30 @@ export class Pane {
       this.surface ??= new SurfaceView(this.stage.surfaceHost);
     }
     if (this.stage.depth) this.surface.show(this.stage.depth, this.stage.range);
+  }
+
+  /** The daemon's reference image, in the present light. */
+  private async fetchReference(): Promise<void> {
+    if (this.views.value !== "difference") return;
+    try {
+      const result = await this.sensor.request({
+        case: "getReference",
+        value: create(GetReferenceSchema),
+      });
+      if (result.case !== "reference") return;
+      const png = new Blob([result.value.png as BlobPart], { type: "image/png" });
+      const bitmap = await createImageBitmap(png, { colorSpaceConversion: "none" });
+      const { width, height } = bitmap;
+      const context = new OffscreenCanvas(width, height).getContext("2d");
+      context?.drawImage(bitmap, 0, 0);
+      bitmap.close();
+      // Red of each pixel, which is its grey.
+      const rgba = context?.getImageData(0, 0, width, height).data;
+      const values = new Uint8Array(width * height).map((_, i) => rgba?.[4 * i] ?? 0);
+      this.stage.reference = { width, height, values };
+    } catch (error) {
+      this.showNotice(`No reference: ${(error as Error).message}`);
+    }
   }
 
   /** dtact-perceive serves no maps, and is commanded nothing. */
@@ -262,14 +309,14 @@ export class Pane {
       this.state,
       {
         connecting: "connecting",
-        live: "live",
+        live: this.file ? "recording" : "live",
         away: "away",
         token: "token needed",
         ended: "ended",
       }[link.state],
     );
     this.showNotice(link.state === "live" && link.sentence === "Connected." ? "" : link.sentence);
-    this.recording.allow(link.state === "live");
+    this.recording.allow(link.state === "live" && !this.file);
     this.tokenForm.hidden = link.state !== "token";
     // A paused view goes on showing its frame.
     if (this.paused) this.stage.cover("");
@@ -290,7 +337,9 @@ export class Pane {
       .join(" · ");
     this.state.title = title;
     this.light.allow(this.sensor.mayControl);
+    this.camera.allow(this.sensor.mayControl);
     this.reconstruction.allow(this.sensor.mayControl);
+    this.objects.allow();
     this.pause(false);
     this.servesPoints = hello.features.includes("cloud");
     if (this.servesPoints) return void this.lookAtPoints();
@@ -305,14 +354,21 @@ export class Pane {
       void this.calibrations.refresh();
       void this.quality.ask(this.sensor);
     }
+    if (event.what.case === "reference" || event.what.case === "light") void this.fetchReference();
     if (event.what.case === "light") this.light.show(event.what.value);
     if (event.what.case === "reconstruction") this.reconstruction.show(event.what.value);
+  }
+
+  private played(played: Played): void {
+    this.timeline.show(played);
+    if (played.ended) this.pause(true);
   }
 
   private status(status: Status): void {
     this.lastStatus = status;
     this.quality.status(status);
     if (status.light) this.light.show(status.light);
+    this.camera.show(status.camera?.settings);
     if (status.reconstruction) this.reconstruction.show(status.reconstruction);
   }
 
@@ -340,7 +396,11 @@ export class Pane {
   }
 
   private coverOf(frame: Frame): string {
-    if (this.views.value === "camera")
+    if (this.views.value === "difference" && !this.stage.reference)
+      return "Waiting for the reference.";
+    if (isPicture(this.views.value) && this.file && !this.sensor.features.includes("jpeg"))
+      return "The recording has no pictures of the camera.";
+    if (isPicture(this.views.value))
       return frame.luma || this.stage.luma ? "" : "Waiting for the camera's picture.";
     if (frame.depth) return "";
     if (this.isUncalibrated(frame))
@@ -355,7 +415,7 @@ export class Pane {
   private isUncalibrated(frame: Frame): boolean {
     return (
       !frame.depth &&
-      this.views.value !== "camera" &&
+      !isPicture(this.views.value) &&
       this.lastStatus?.state === State.UNCALIBRATED
     );
   }

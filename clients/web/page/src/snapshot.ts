@@ -2,6 +2,7 @@
 import type { Status } from "../gen/dtact_pb";
 import { el } from "./dom";
 import type { Frame } from "./session/messages";
+import { isPicture } from "./view/stage";
 import type { Stage, View } from "./view/stage";
 import { fixed } from "./labels";
 
@@ -15,7 +16,7 @@ export async function saveSnapshot(
   const time = new Date(frame.wallMs).toISOString();
   const light = frame.light ? `brightness ${frame.light.brightness}` : "light unknown";
   const lines = [`${sensor} · ${time} · frame ${frame.sequence}`];
-  if (view !== "camera" && stage.depth) {
+  if (!isPicture(view) && stage.depth) {
     const { fromMm, toMm } = stage.range;
     const worth = `± ${fixed(stage.depth.uncertaintyUm, 0)} µm`;
     lines.push(`range ${fromMm} to ${toMm} mm · ${worth} · ${fixed(stage.depth.mmPerPx, 4)} mm/px`);

@@ -40,7 +40,11 @@ export class CalibrationsPanel {
   private lacking = false;
   private inUse: MapShape | undefined;
 
-  constructor(private readonly sensor: Sensor) {
+  /** `line`: see Guide. */
+  constructor(
+    private readonly sensor: Sensor,
+    private readonly line: () => number[] | undefined,
+  ) {
     this.picker.addEventListener("change", () => void this.send());
   }
 
@@ -66,7 +70,7 @@ export class CalibrationsPanel {
   async guide(): Promise<void> {
     // The list may not have come yet, and the map's shape is in it.
     await this.refresh();
-    const guide = new Guide(this.sensor, this.inUse, () => void this.refresh());
+    const guide = new Guide(this.sensor, this.inUse, this.line(), () => void this.refresh());
     this.element.append(guide.element);
     guide.open();
   }

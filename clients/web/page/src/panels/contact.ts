@@ -1,7 +1,7 @@
 // The contact in numbers.
-import { ObjectPose_Tracking } from "../../gen/dtact_pb";
-import type { ObjectPose, Vector3 } from "../../gen/dtact_pb";
-import { Facts, panel } from "../dom";
+import { ObjectPose_Tracking, Recognition_Verdict } from "../../gen/dtact_pb";
+import type { ObjectPose, Recognition, Vector3 } from "../../gen/dtact_pb";
+import { el, Facts, panel, say } from "../dom";
 import type { Frame } from "../session/messages";
 import { absence, fixed, forceAbsence, mm } from "../labels";
 
@@ -28,7 +28,50 @@ function motion(pose: ObjectPose | undefined): { moved: string; turned: string }
   };
 }
 
+/** What the object is, in a word or two. */
+function verdict(recognition: Recognition): string {
+  switch (recognition.verdict) {
+    case Recognition_Verdict.KNOWN:
+      return recognition.candidates[0]?.name ?? "–";
+    case Recognition_Verdict.UNKNOWN:
+      return "unknown object";
+    case Recognition_Verdict.TOO_SHALLOW:
+      return "press deeper";
+    case Recognition_Verdict.CUT_OFF:
+      return "press nearer to the middle";
+    default:
+      return "unsure: press again";
+  }
+}
+
+/** The object's name and the most probable candidates as bars, from dtact-perceive. */
+class ObjectView {
+  private readonly name = el("strong");
+  private readonly bars = [0, 1, 2].map(() => ({
+    label: el("span"),
+    meter: el("meter", { min: "0", max: "1" }),
+  }));
+  readonly element = el(
+    "div",
+    { class: "object", hidden: "" },
+    this.name,
+    ...this.bars.map(({ label, meter }) => el("label", {}, label, meter)),
+  );
+
+  show(recognition: Recognition | undefined): void {
+    if (recognition) this.element.hidden = false;
+    say(this.name, recognition ? verdict(recognition) : "–");
+    this.bars.forEach(({ label, meter }, index) => {
+      const candidate = recognition?.candidates[index];
+      const share = candidate?.probability ?? 0;
+      say(label, candidate ? `${candidate.name} ${fixed(100 * share, 0)} %` : "–");
+      meter.value = share;
+    });
+  }
+}
+
 export class ContactPanel {
+  private readonly object = new ObjectView();
   private readonly motion = new Facts({
     moved: { label: "Moved", hint: "Since the contact was made: x, y, z of the surface frame" },
     turned: {
@@ -50,19 +93,26 @@ export class ContactPanel {
       hint: "Along the surface's normal; needs a calibration by dtact-calibrate force",
     },
   });
-  readonly element = panel("Contact", this.facts.element, this.motion.element);
+  readonly element = panel(
+    "Contact",
+    this.object.element,
+    this.facts.element,
+    this.motion.element,
+  );
 
   constructor() {
     this.hideMotion();
   }
 
-  /** For a sensor without the motion of the object in contact. */
+  /** For a sensor without motion and recognition of the object in contact. */
   hideMotion(): void {
     this.motion.element.hidden = true;
+    this.object.element.hidden = true;
   }
 
   show(frame: Frame): void {
     if (frame.pose) this.motion.element.hidden = false;
+    this.object.show(frame.recognition);
     const { moved, turned } = motion(frame.pose);
     this.motion.set("moved", moved);
     this.motion.set("turned", turned);

@@ -1,16 +1,10 @@
-// The guided calibration: what dtact-calibrate says, asks and sees, which the gateway runs and relays
-// (clients/common/guided.proto), and what has been pressed so far.
-import { fromJsonString } from "@bufbuild/protobuf";
-import { GuidedLineSchema } from "../../gen/guided_pb";
-import type { GuidedAnswer, GuidedPress, GuidedScene } from "../../gen/guided_pb";
+// The guided calibration: the session with dtact-calibrate, and what has been pressed so far.
+import type { GuidedPress, GuidedScene } from "../../gen/guided_pb";
 import { button, el, say, svg } from "../dom";
 import type { Sensor } from "../session/sensor";
 import { fixed } from "../labels";
+import { Talk } from "./talk";
 
-/** Length of the picture's scale bar, mm. */
-const BAR_MM = 5;
-/** Lines that stay; a session says some fifty. */
-const MAX_SAID = 200;
 const [DEPTH_WIDTH, DEPTH_HEIGHT] = [280, 46];
 
 /** What the map of a calibration is like. */
@@ -40,6 +34,11 @@ export class Guide {
     step: "any",
     required: "",
   });
+  private readonly ruler = number("Length of the drawn line, mm", {
+    min: "0.1",
+    max: "1000",
+    step: "any",
+  });
   private readonly width = number("Map's width, pixels", SIZE);
   private readonly height = number("Map's height, pixels", SIZE);
   private readonly presses = number("Presses", {
@@ -51,39 +50,24 @@ export class Guide {
   });
   private readonly resume = el("input", { type: "checkbox" });
   private readonly form: HTMLFormElement;
-  private readonly picture = el("canvas", { width: "1", height: "1" });
-  private readonly words = el("figcaption", { "data-fact": "words" });
-  private readonly said = el("ol", { class: "said", "aria-label": "Said", "aria-live": "polite" });
-  private readonly prompt = el("p", { class: "prompt", role: "status" });
-  private readonly answers = el("div", {
-    class: "row wrap",
-    role: "group",
-    "aria-label": "Answer",
-  });
   private readonly depths = svg("svg", {
     viewBox: `0 0 ${DEPTH_WIDTH} ${DEPTH_HEIGHT}`,
     class: "depths",
     role: "img",
     "aria-label": "Depths of the presses, and how deep the LUT reaches",
   });
-  private readonly session = el(
-    "div",
-    { class: "session", hidden: "" },
-    el("figure", {}, this.picture, this.words),
-    el("div", { class: "talk" }, this.said, this.depths, this.prompt, this.answers),
-  );
-  private readonly trouble = el("p", { class: "answer", role: "alert" });
+  private readonly talk: Talk;
   private readonly closing = button("Close", () => this.element.close());
   readonly element: HTMLDialogElement;
-  private socket: WebSocket | undefined;
-  private bitmap: ImageBitmap | undefined;
-  private scene: GuidedScene | undefined;
-  private ended = false;
 
-  /** `now`: of the calibration in use; `changed`: the daemon's calibrations may be others. */
+  /**
+   * `now`: of the calibration in use; `line`: drawn on the camera's picture, x and y of both ends;
+   * `changed`: the daemon's calibrations may be others.
+   */
   constructor(
-    private readonly sensor: Sensor,
+    sensor: Sensor,
     now: MapShape | undefined,
+    private readonly line: number[] | undefined,
     private readonly changed: () => void,
   ) {
     if (now) {
@@ -91,20 +75,24 @@ export class Guide {
       this.width.value = String(now.width);
       this.height.value = String(now.height);
     }
+    this.ruler.addEventListener("input", () => this.measure());
     this.form = this.makeForm();
+    this.talk = new Talk(sensor, this.depths, {
+      scene: (scene) => this.drawDepths(scene),
+      ended: () => this.end(),
+    });
     this.element = el(
       "dialog",
       { class: "guide", "aria-label": "Guided calibration" },
       el("h3", {}, `Calibrate ${sensor.name}`),
       this.form,
-      this.session,
-      this.trouble,
+      this.talk.element,
       el("div", { class: "row" }, this.closing),
     );
     this.element.addEventListener("close", () => this.leave());
     // Escape would end a session of minutes; what was taken stays, but the button says so.
     this.element.addEventListener("cancel", (event) => {
-      if (this.socket && !this.ended) event.preventDefault();
+      if (this.talk.running) event.preventDefault();
     });
     // The page's own keys mean nothing here.
     this.element.addEventListener("keydown", (event) => event.stopPropagation());
@@ -128,6 +116,15 @@ export class Guide {
       ),
       field("Ball's radius, mm", this.radius),
       field("Scale of the picture, mm per pixel", this.scale),
+      this.line
+        ? field("or the length of the drawn line, mm", this.ruler)
+        : el(
+            "p",
+            { class: "quiet" },
+            "If you do not know the scale: press a ruler or a coin in, choose Camera and Line, draw " +
+              "along a known length, and open this again. dtact-calibrate lens finds it from a " +
+              "board of pins.",
+          ),
       field("Map, pixels: the whole picture, or", this.width, this.height),
       field("Presses", this.presses),
       field("Continue the last session", this.resume),
@@ -140,90 +137,31 @@ export class Guide {
     return form;
   }
 
+  /** The scale that the drawn line gives. */
+  private measure(): void {
+    const [x0 = 0, y0 = 0, x1 = 0, y1 = 0] = this.line ?? [];
+    const scale = this.ruler.valueAsNumber / Math.hypot(x1 - x0, y1 - y0);
+    this.scale.readOnly = scale > 0;
+    if (scale > 0) this.scale.value = String(Number(scale.toPrecision(6)));
+  }
+
   private begin(): void {
     const crop = [this.width, this.height].map((input) => input.valueAsNumber);
-    const start = JSON.stringify({
-      radius_mm: this.radius.valueAsNumber,
-      mm_per_px: this.scale.valueAsNumber,
-      presses: this.presses.valueAsNumber,
-      resume: this.resume.checked,
-      ...(crop.every((size) => size > 0) ? { crop } : {}),
-    });
     this.form.hidden = true;
-    this.session.hidden = false;
     say(this.closing, "End");
-    say(this.trouble, "");
-    const socket = new WebSocket(this.sensor.calibrateAddress);
-    this.socket = socket;
-    socket.onopen = () => socket.send(start);
-    socket.onmessage = (message) => this.take(message.data as string);
-    socket.onclose = () => this.end("The connection was lost. Begin again with the last session to continue.");
-  }
-
-  private take(text: string): void {
-    const { line } = fromJsonString(GuidedLineSchema, text);
-    if (line.case === "text") this.tell(line.value);
-    else if (line.case === "started") this.tell("Every image is saved as soon as it is taken.");
-    else if (line.case === "scene") void this.show(line.value);
-    else if (line.case === "ended") this.end(line.value.error);
-  }
-
-  private tell(text: string): void {
-    for (const sentence of text.split("\n").filter((part) => part !== ""))
-      this.said.append(el("li", {}, sentence));
-    while (this.said.childElementCount > MAX_SAID) this.said.firstElementChild?.remove();
-    this.said.scrollTop = this.said.scrollHeight;
-  }
-
-  /** What is asked stays until it changes, so that a button is not replaced while it is pressed. */
-  private async show(scene: GuidedScene): Promise<void> {
-    const before = this.scene;
-    this.scene = scene;
-    say(this.words, scene.words);
-    say(this.prompt, scene.prompt);
-    const asked = ({ answers }: { answers: GuidedAnswer[] }): string =>
-      answers.map(({ key, words }) => `${key} ${words}`).join();
-    if (!before || asked(before) !== asked(scene)) this.ask(scene.answers);
-    this.drawDepths(scene);
-    if (scene.picturePng.length > 0) {
-      const png = new Blob([scene.picturePng as BlobPart], { type: "image/png" });
-      const bitmap = await createImageBitmap(png);
-      this.bitmap?.close();
-      this.bitmap = bitmap;
-    }
-    this.draw();
-  }
-
-  private ask(answers: GuidedAnswer[]): void {
-    const made = answers.map(({ key, words }) =>
-      button(words, () => this.socket?.send(key), { "data-key": key }),
+    this.talk.begin(
+      {
+        radius_mm: this.radius.valueAsNumber,
+        mm_per_px: this.scale.valueAsNumber,
+        presses: this.presses.valueAsNumber,
+        resume: this.resume.checked,
+        ...(crop.every((size) => size > 0) ? { crop } : {}),
+        ...(this.line && this.scale.readOnly
+          ? { ruler: [...this.line, this.ruler.valueAsNumber] }
+          : {}),
+      },
+      "Begin again with the last session to continue.",
     );
-    this.answers.replaceChildren(...made);
-    made[0]?.focus();
-  }
-
-  private draw(): void {
-    if (!this.bitmap || !this.scene) return;
-    const { width, height } = this.bitmap;
-    Object.assign(this.picture, { width, height });
-    const context = this.picture.getContext("2d");
-    if (!context) return;
-    context.drawImage(this.bitmap, 0, 0);
-    context.strokeStyle = context.fillStyle = getComputedStyle(this.picture).color;
-    context.lineWidth = Math.max(1, width / 290);
-    context.textAlign = "center";
-    context.textBaseline = "middle";
-    context.font = `${Math.round(width / 28)}px sans-serif`;
-    this.scene.presses.forEach(({ col, row, radiusPx }, index) => {
-      context.beginPath();
-      context.arc(col, row, radiusPx, 0, 2 * Math.PI);
-      context.stroke();
-      context.fillText(String(index + 1), col, row);
-    });
-    const bar = BAR_MM / this.scene.mmPerPx;
-    context.textAlign = "left";
-    context.fillRect(12, height - 16, bar, 4);
-    context.fillText(`${BAR_MM} mm`, 12, height - 30);
   }
 
   /** Depth from left to right: what the list covers, and each press. */
@@ -249,20 +187,13 @@ export class Guide {
     );
   }
 
-  private end(error: string): void {
-    if (this.ended) return;
-    this.ended = true;
-    this.answers.replaceChildren();
-    say(this.prompt, "");
-    say(this.trouble, error);
+  private end(): void {
     say(this.closing, "Close");
     this.changed();
   }
 
   private leave(): void {
-    this.ended = true;
-    this.socket?.close();
-    this.bitmap?.close();
+    this.talk.close();
     this.element.remove();
   }
 }

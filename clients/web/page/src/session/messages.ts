@@ -6,10 +6,13 @@ import type {
   HelloReply,
   LightState,
   ObjectPose,
+  Recognition,
   Reply,
 } from "../../gen/dtact_pb";
 import type { ContactAbsence, Health } from "../../gen/dtact_pb";
+import type { Played } from "../recording/player";
 import type { Recorded } from "../recording/recorder";
+import type { Viewpoint } from "../view/overlay";
 
 /** Which parts of a frame the page shows at present. */
 export interface Wants {
@@ -26,6 +29,7 @@ export interface DepthMap {
   width: number;
   height: number;
   mmPerPx: number;
+  viewpoint: Viewpoint;
   /** Micrometres a unit. */
   umPerUnit: number;
   untrusted: number;
@@ -64,8 +68,9 @@ export interface Frame {
   calibration: number | undefined;
   depth: DepthMap | undefined;
   luma: LumaMap | undefined;
-  /** Only dtact-perceive sends pose and cloud. */
+  /** Only dtact-perceive sends pose, recognition and cloud. */
   pose: ObjectPose | undefined;
+  recognition: Recognition | undefined;
   cloud: Cloud | undefined;
   /** What making the depth took, milliseconds, and at which share of the resolution: 1, 2 or 4. */
   madeMs: number;
@@ -86,6 +91,9 @@ export interface Link {
 
 export type ToWorker =
   | { kind: "open"; url: string; program: string; token: string; nearby: boolean; wants: Wants }
+  /** In place of "open": a recording. */
+  | { kind: "play"; file: File; wants: Wants }
+  | { kind: "seek"; seconds: number }
   | { kind: "token"; token: string }
   | { kind: "wants"; wants: Wants }
   | { kind: "request"; id: number; request: Request }
@@ -101,6 +109,7 @@ export type FromWorker =
   | { kind: "frame"; frame: Frame }
   | { kind: "event"; event: Event }
   | { kind: "recorded"; recorded: Recorded }
+  | { kind: "played"; played: Played }
   | { kind: "reply"; id: number; reply: Reply }
   /** A request that will have no answer: the connection is gone. */
   | { kind: "unanswered"; id: number };

@@ -2,6 +2,7 @@
 import { create } from "@bufbuild/protobuf";
 import { GetStatusSchema, Rights } from "../../gen/dtact_pb";
 import type { Event, HelloReply, Reply, Status } from "../../gen/dtact_pb";
+import type { Played } from "../recording/player";
 import type { Recorded } from "../recording/recorder";
 import type { Frame, FromWorker, Link, Request, ToWorker, Wants } from "./messages";
 
@@ -25,6 +26,7 @@ export interface Watcher {
   event(event: Event): void;
   status(status: Status): void;
   recorded(recorded: Recorded): void;
+  played(played: Played): void;
 }
 
 const HERE = ["localhost", "127.0.0.1", "[::1]"];
@@ -47,9 +49,11 @@ export class Sensor {
     private token: string,
     wants: Wants,
     private readonly watcher: Watcher,
+    recording?: File,
   ) {
     this.worker.onmessage = (message: MessageEvent<FromWorker>) => this.take(message.data);
-    this.send({
+    if (recording) this.send({ kind: "play", file: recording, wants });
+    else this.send({
       kind: "open",
       url: this.address("wire"),
       program: "dtact-web page",
@@ -92,6 +96,11 @@ export class Sensor {
 
   pause(paused: boolean): void {
     this.send({ kind: "pause", paused });
+  }
+
+  /** Plays a recording from there on. */
+  seek(seconds: number): void {
+    this.send({ kind: "seek", seconds });
   }
 
   /** Begins a recording, or ends it: its file comes with recorded(). */
@@ -141,6 +150,8 @@ export class Sensor {
         return this.watcher.event(message.event);
       case "recorded":
         return this.watcher.recorded(message.recorded);
+      case "played":
+        return this.watcher.played(message.played);
       case "frame":
         return this.takeFrame(message.frame);
       case "reply": {

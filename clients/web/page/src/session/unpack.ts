@@ -4,6 +4,7 @@ import type {
   Frame as WireFrame,
   LumaMap as WireLuma,
   PointCloud as WireCloud,
+  Surface as WireSurface,
 } from "../../gen/dtact_pb";
 import { CloudEncoding, LumaEncoding } from "../../gen/dtact_pb";
 import { decodeDepth, MAX_VALUES } from "../wire/depth";
@@ -30,7 +31,7 @@ export class Spare {
   }
 }
 
-function unpackDepth(map: WireDepth, spare: Spare): DepthMap {
+function unpackDepth(map: WireDepth, surface: WireSurface | undefined, spare: Spare): DepthMap {
   const length = map.width * map.height;
   if (length > MAX_VALUES) throw new Error(`a depth map of ${map.width} x ${map.height}`);
   const values = spare.takeDepth(length);
@@ -40,6 +41,11 @@ function unpackDepth(map: WireDepth, spare: Spare): DepthMap {
     width: map.width,
     height: map.height,
     mmPerPx: map.mmPerPx,
+    viewpoint: {
+      footXMm: surface?.footXMm ?? 0,
+      footYMm: surface?.footYMm ?? 0,
+      perMm: surface?.perMm ?? 0,
+    },
     umPerUnit: map.umPerUnit,
     untrusted: map.untrustedValue,
     uncertaintyUm: map.uncertaintyUm,
@@ -94,7 +100,7 @@ export function unpack(
   dropped: number,
   behind: number | undefined,
 ): Frame {
-  const depth = frame.depth && unpackDepth(frame.depth, spare);
+  const depth = frame.depth && unpackDepth(frame.depth, frame.surface, spare);
   const noContact = frame.contact?.inContact === false;
   return {
     sequence: Number(frame.sequence),
@@ -108,6 +114,7 @@ export function unpack(
     depth,
     luma: frame.luma && unpackLuma(frame.luma, spare),
     pose: frame.pose,
+    recognition: frame.recognition,
     cloud: frame.cloud && unpackCloud(frame.cloud),
     madeMs: frame.times
       ? (frame.times.rectifyNs + frame.times.smoothNs + frame.times.lutNs) / 1e6

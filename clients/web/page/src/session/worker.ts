@@ -10,6 +10,7 @@ import {
   SubscribeSchema,
 } from "../../gen/dtact_pb";
 import type { Frame as WireFrame, HelloReply, Reply } from "../../gen/dtact_pb";
+import { Player } from "../recording/player";
 import { Recorder } from "../recording/recorder";
 import { ClockOffset, nowMs } from "./clock";
 import { Connection } from "./connection";
@@ -68,6 +69,8 @@ class Session {
   take(message: ToWorker): void {
     switch (message.kind) {
       case "open":
+      case "play":
+      case "seek":
         break;
       case "token":
         this.connection.retry(message.token);
@@ -209,6 +212,7 @@ class Session {
       decimation: 2,
       region: { case: "contactBox", value: true },
       pose: true,
+      recognition: this.features.includes("recognition"),
     };
   }
 
@@ -255,8 +259,9 @@ function post(message: FromWorker, memory: Transferable[] = []): void {
   self.postMessage(message, { transfer: memory });
 }
 
-let session: Session | undefined;
+let session: Session | Player | undefined;
 self.onmessage = (message: MessageEvent<ToWorker>) => {
   if (message.data.kind === "open") session = new Session(message.data);
+  else if (message.data.kind === "play") session = new Player(message.data.file, message.data.wants, post);
   else session?.take(message.data);
 };

@@ -35,6 +35,7 @@ uniform mat4 projectionMatrix;
 uniform sampler2D depths;
 uniform vec2 grid;
 uniform float spacingMm;
+uniform vec3 viewpoint;
 uniform float exaggeration;
 in vec2 position;
 out vec3 normal;
@@ -53,6 +54,7 @@ void main() {
   // As the camera sees it, from inside the sensor: what is pressed comes towards the viewer, and left
   // and right are those of the map. Seen from outside it would be mirrored.
   vec2 flat_mm = (pixel - 0.5 * (grid - 1.0)) * spacingMm;
+  if (depthMm > -99.0) flat_mm -= (flat_mm - viewpoint.xy) * viewpoint.z * depthMm;
   vec4 seen = modelViewMatrix * vec4(flat_mm.x, -flat_mm.y, height, 1.0);
   vec2 slope = 0.5 / spacingMm * vec2(heightAt(at + ivec2(1, 0)) - heightAt(at - ivec2(1, 0)),
                                       heightAt(at - ivec2(0, 1)) - heightAt(at + ivec2(0, 1)));
@@ -135,6 +137,7 @@ export class SurfaceView {
         colours: { value: colours },
         grid: { value: [1, 1] },
         spacingMm: { value: 1 },
+        viewpoint: { value: [0, 0, 0] },
         exaggeration: { value: 3 },
         fromMm: { value: 0 },
         toMm: { value: 1.5 },
@@ -167,6 +170,8 @@ export class SurfaceView {
     }
     if (this.texture) this.texture.needsUpdate = true;
     this.uniform("spacingMm", depth.mmPerPx * every);
+    const { footXMm, footYMm, perMm } = depth.viewpoint;
+    this.uniform("viewpoint", [footXMm, footYMm, perMm]);
     this.uniform("fromMm", range.fromMm);
     this.uniform("toMm", range.toMm);
     this.space.render();

@@ -13,11 +13,37 @@ export interface Line {
   to: Place;
 }
 
+/** Where the camera stands above a plane surface: dtact.v1.Surface. */
+export interface Viewpoint {
+  footXMm: number;
+  footYMm: number;
+  perMm: number;
+}
+
 /** How the map that is shown lies in the surface frame. */
 export interface Grid {
   width: number;
   height: number;
   mmPerPx: number;
+  viewpoint: Viewpoint;
+}
+
+/** Where a point lies that appears at `seen` and is pressed in by `depthMm`. */
+export function truePlace({ footXMm, footYMm, perMm }: Viewpoint, seen: Place, depthMm: number): Place {
+  const share = perMm * depthMm;
+  return {
+    xMm: seen.xMm - share * (seen.xMm - footXMm),
+    yMm: seen.yMm - share * (seen.yMm - footYMm),
+  };
+}
+
+/** Where a point appears at `place` and is pressed in by `depthMm`. */
+export function seenPlace({ footXMm, footYMm, perMm }: Viewpoint, place: Place, depthMm: number): Place {
+  const rest = 1 - perMm * depthMm;
+  return {
+    xMm: footXMm + (place.xMm - footXMm) / rest,
+    yMm: footYMm + (place.yMm - footYMm) / rest,
+  };
 }
 
 export function placeOf(grid: Grid, column: number, row: number): Place {
@@ -45,6 +71,8 @@ export interface Marks {
   cursor: Place | undefined;
   line: Line | undefined;
   zoom: Zoom;
+  /** Not on the camera's picture, whose grid counts pixels. */
+  hasScale: boolean;
 }
 
 /** A length in round millimetres of about a fifth of what is shown. */
@@ -91,9 +119,13 @@ export function drawMarks(
   context.lineCap = "round";
 
   if (marks.contact?.inContact) {
-    const [cx, cy] = at({ xMm: marks.contact.xMm, yMm: marks.contact.yMm });
+    const { areaMm2, volumeMm3, deepestMm } = marks.contact;
+    const pressedMm = areaMm2 > 0 ? volumeMm3 / areaMm2 : 0;
+    const centroid = { xMm: marks.contact.xMm, yMm: marks.contact.yMm };
+    const [cx, cy] = at(seenPlace(grid.viewpoint, centroid, pressedMm));
     stroke(() => context.arc(cx, cy, 6, 0, 2 * Math.PI));
-    const [dx, dy] = at({ xMm: marks.contact.deepestXMm, yMm: marks.contact.deepestYMm });
+    const deepest = { xMm: marks.contact.deepestXMm, yMm: marks.contact.deepestYMm };
+    const [dx, dy] = at(seenPlace(grid.viewpoint, deepest, deepestMm));
     stroke(() => {
       context.moveTo(dx - 5, dy - 5);
       context.lineTo(dx + 5, dy + 5);
@@ -130,6 +162,7 @@ export function drawMarks(
       }
     }, 1);
   }
+  if (!marks.hasScale) return;
   const length = scaleLength(grid, zoom);
   const long = (length / grid.mmPerPx) * scale;
   stroke(() => {

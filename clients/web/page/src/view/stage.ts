@@ -1,17 +1,21 @@
 // The picture: map or camera, what is drawn over it, and the value under the cursor.
 import { el, say } from "../dom";
 import type { DepthMap, Frame, LumaMap } from "../session/messages";
-import { mm, um } from "../labels";
+import { fixed, mm, um } from "../labels";
 import { drawColourBar } from "./colour_bar";
 import { MapCanvas } from "./map_canvas";
 import type { Range } from "./map_canvas";
 import { drawMarks, pixelOf, placeOf } from "./overlay";
-import type { Line, Marks, Place } from "./overlay";
-import { lineText, profileOf, valueUm } from "./reading";
+import type { Grid, Line, Marks, Place } from "./overlay";
+import { lengthOf, lineText, pointAt, profileOf, valueUm } from "./reading";
 import type { Profile } from "./reading";
 import { Zoom } from "./zoom";
 
-export type View = "depth" | "camera" | "surface";
+export type View = "depth" | "camera" | "difference" | "surface";
+/** Of the camera's pixels, not of the map's. */
+export const isPicture = (view: View): boolean => view === "camera" || view === "difference";
+/** Grey levels drawn for one of difference. */
+const CONTRAST = 4;
 export type Tool = "point" | "line";
 
 /** Draws a 2D canvas at the screen's own resolution. */
@@ -77,6 +81,9 @@ export class Stage {
   private frame: Frame | undefined;
   depth: DepthMap | undefined;
   luma: LumaMap | undefined;
+  /** What the difference is taken from, as large as the camera's picture. */
+  reference: LumaMap | undefined;
+  private difference: LumaMap | undefined;
   /** Called when the drawn line or its values may have changed. */
   profiled: (profile: Profile | undefined) => void = () => {};
 
@@ -95,7 +102,7 @@ export class Stage {
     target.addEventListener("pointerdown", (event) => {
       this.held.set(event.pointerId, this.shares(event));
       this.point(event);
-      if (this.tool !== "line" || this.view !== "depth" || !this.cursor) return;
+      if (this.tool !== "line" || this.view === "surface" || !this.cursor) return;
       target.setPointerCapture(event.pointerId);
       this.drawing = true;
       this.line = { from: this.cursor, to: this.cursor };
@@ -148,8 +155,8 @@ export class Stage {
 
   look(view: View): void {
     // A place is in millimetres on the map, in pixels on the camera's picture.
-    if ((view === "camera") !== (this.view === "camera")) {
-      this.cursor = undefined;
+    if (isPicture(view) !== isPicture(this.view)) {
+      this.cursor = this.line = undefined;
       this.zoom.reset();
       this.zoomed();
     }
@@ -157,7 +164,7 @@ export class Stage {
     this.view = view;
     this.element.dataset["view"] = view;
     if (view === "depth" && this.depth) this.map.drawDepth(this.depth);
-    if (view === "camera" && this.luma) this.map.drawLuma(this.luma);
+    this.drawPicture();
     this.shape();
     this.drawOver();
     this.drawBar();
@@ -170,6 +177,22 @@ export class Stage {
     if (tool === "point") this.line = undefined;
     this.showProfile();
     this.drawOver();
+  }
+
+  private drawPicture(): void {
+    if (!this.luma || !isPicture(this.view)) return;
+    const { values, width, height } = this.luma;
+    const { reference } = this;
+    if (this.view === "camera") this.map.drawLuma(this.luma);
+    if (this.view === "camera" || reference?.width !== width || reference.height !== height) return;
+    if (this.difference?.values.length !== values.length)
+      this.difference = { width, height, values: new Uint8Array(values.length) };
+    const grey = this.difference.values;
+    for (let i = 0; i < grey.length; ++i) {
+      const level = 128 + CONTRAST * ((values[i] as number) - (reference.values[i] as number));
+      grey[i] = Math.min(Math.max(level, 0), 255);
+    }
+    this.map.drawLuma(this.difference);
   }
 
   /** A sentence over the picture, empty for none, and a button below it. */
@@ -195,7 +218,7 @@ export class Stage {
     if (frame.depth) this.depth = frame.depth;
     if (frame.luma) this.luma = frame.luma;
     if (this.view === "depth" && frame.depth) this.map.drawDepth(frame.depth);
-    if (this.view === "camera" && frame.luma) this.map.drawLuma(frame.luma);
+    if (frame.luma) this.drawPicture();
     this.shape();
     this.drawOver();
     this.showValue();
@@ -207,7 +230,7 @@ export class Stage {
    * below, as a PNG. Of a surface it is the newest map: the canvas still has what was shown before.
    */
   picturePng(lines: string[], ink: string, paper: string): Promise<Blob> {
-    const depth = this.view === "camera" ? undefined : this.depth;
+    const depth = isPicture(this.view) ? undefined : this.depth;
     if (depth) this.map.drawDepth(depth);
     const [width, height] = [this.canvas.width, this.canvas.height];
     const scale = Math.max(1, Math.round(580 / width));
@@ -242,7 +265,7 @@ export class Stage {
   }
 
   private shown(): DepthMap | LumaMap | undefined {
-    return this.view === "camera" ? this.luma : this.depth;
+    return isPicture(this.view) ? this.luma : this.depth;
   }
 
   private shape(): void {
@@ -250,16 +273,26 @@ export class Stage {
     if (map) this.picture.style.setProperty("--shape", String(map.width / map.height));
   }
 
-  private marks(grid: DepthMap): Marks {
+  private marks(map: DepthMap | LumaMap): Marks {
     const { cursor, line, zoom } = this;
-    return { grid, contact: this.frame?.contact, cursor, line, zoom };
+    const contact = "mmPerPx" in map ? this.frame?.contact : undefined;
+    return { grid: this.grid(map), contact, cursor, line, zoom, hasScale: "mmPerPx" in map };
+  }
+
+  /** The line drawn on the camera's picture: x and y of both ends, pixels. */
+  get cameraLine(): number[] | undefined {
+    const { line, luma } = this;
+    if (!line || !luma || !isPicture(this.view)) return undefined;
+    return [line.from, line.to].flatMap((end) => {
+      const pixel = pixelOf(this.grid(luma), end);
+      return pixel ? [pixel.column, pixel.row] : [];
+    });
   }
 
   private drawOver(): void {
     const { context, width, height } = sharp(this.marksCanvas);
-    if (this.view === "depth" && this.depth && width > 0) {
-      drawMarks(context, width, height, this.marks(this.depth));
-    }
+    const map = this.view === "surface" ? undefined : this.shown();
+    if (map && width > 0) drawMarks(context, width, height, this.marks(map));
   }
 
   private point(event: PointerEvent): void {
@@ -337,8 +370,10 @@ export class Stage {
   }
 
   /** The camera's picture has no millimetres of its own: its pixels stand for them. */
-  private grid(map: DepthMap | LumaMap): { width: number; height: number; mmPerPx: number } {
-    return { width: map.width, height: map.height, mmPerPx: "mmPerPx" in map ? map.mmPerPx : 1 };
+  private grid(map: DepthMap | LumaMap): Grid {
+    if ("mmPerPx" in map) return map;
+    const viewpoint = { footXMm: 0, footYMm: 0, perMm: 0 };
+    return { width: map.width, height: map.height, mmPerPx: 1, viewpoint };
   }
 
   private moveTo(place: Place | undefined): void {
@@ -357,25 +392,32 @@ export class Stage {
     if (!map || !pixel || !this.cursor) {
       say(
         this.readout,
-        this.line && this.view === "depth"
-          ? lineText(this.depth, this.line)
-          : "Point at the map for its values.",
+        this.lineWords() || "Point at the map for its values.",
       );
       return;
     }
     const where = `row ${pixel.row}, column ${pixel.column}`;
+    const words = this.lineWords();
+    const line = words && ` · ${words}`;
     if ("mmPerPx" in map) {
       const value = valueUm(map, pixel.column, pixel.row);
-      const place = `x ${mm(this.cursor.xMm)}, y ${mm(this.cursor.yMm)}`;
+      const { xMm, yMm } = pointAt(map, this.cursor);
+      const place = `x ${mm(xMm)}, y ${mm(yMm)}`;
       const reported = value === null ? "untrusted" : um(value);
-      const line = this.line ? ` · ${lineText(this.depth, this.line)}` : "";
       say(this.readout, `${reported} · ${where} · ${place}${line}`);
     } else {
-      say(
-        this.readout,
-        `grey ${map.values[pixel.row * map.width + pixel.column]} of 255 · ${where}`,
-      );
+      const at = pixel.row * map.width + pixel.column;
+      const grey = map.values[at] as number;
+      const before = this.view === "difference" ? this.reference?.values[at] : undefined;
+      const change = before === undefined ? "" : ` · reference ${before}`;
+      say(this.readout, `grey ${grey} of 255${change} · ${where}${line}`);
     }
+  }
+
+  private lineWords(): string {
+    if (!this.line || this.view === "surface") return "";
+    if (this.view === "depth") return lineText(this.depth, this.line);
+    return `A–B ${fixed(lengthOf(this.line), 1)} pixels`;
   }
 
   private showProfile(): void {

@@ -1,4 +1,4 @@
-#include "clients/ctl/avahi.hpp"
+#include "clients/common/avahi.hpp"
 
 #include <fmt/format.h>
 #include <net/if.h>
@@ -6,15 +6,22 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
+#include <condition_variable>
 #include <cstring>
+#include <future>
 #include <memory>
+#include <mutex>
 #include <optional>
+#include <string_view>
 #include <tuple>
 
 #include "clients/common/exit_codes.hpp"
+#include "clients/cpp/client.hpp"
+#include "hal/base/utf8.hpp"
 #include "proto/defaults.hpp"
 
-namespace dtact::ctl {
+namespace dtact::cli {
 namespace {
 
 using std::chrono::steady_clock;
@@ -25,6 +32,7 @@ constexpr const char* kAvahi = "org.freedesktop.Avahi";
 constexpr const char* kServer = "org.freedesktop.Avahi.Server";
 constexpr const char* kBrowser = "org.freedesktop.Avahi.ServiceBrowser";
 constexpr std::int32_t kAny = -1;  // interface or protocol
+constexpr std::chrono::seconds kInstanceTimeout{2};
 
 struct Unref {
   void operator()(sd_bus* bus) const noexcept { sd_bus_flush_close_unref(bus); }
@@ -45,14 +53,14 @@ class Error {
   }
 
  private:
-  sd_bus_error error_ = SD_BUS_ERROR_NULL;
+  sd_bus_error error_{};
 };
 
 [[noreturn]] void fail(const std::string& reason) {
-  throw cli::Failure(cli::kFailed,
-                     fmt::format("this machine has no avahi-daemon to ask ({}): apt-get install "
-                                 "avahi-daemon, or name the daemon's machine with --host",
-                                 reason));
+  throw Failure(kFailed,
+                fmt::format("this machine has no avahi-daemon to ask ({}): apt-get install "
+                            "avahi-daemon, or name daemons with --host or --daemon",
+                            reason));
 }
 
 /// One instance of the service, on one interface and protocol.
@@ -87,12 +95,6 @@ int on_signal(sd_bus_message* message, void* user_data, sd_bus_error*) {
     received.all = true;
   }
   return 0;
-}
-
-/// Others on the network write it, and it goes to a terminal.
-std::string harmless(std::string text) {
-  std::ranges::replace_if(text, [](unsigned char c) { return c < 0x20 || c == 0x7f; }, '?');
-  return text;
 }
 
 Bus open_bus() {
@@ -136,7 +138,7 @@ std::vector<std::string> read_strings(sd_bus_message* message) {
 }
 
 /// Nothing when the daemon left meanwhile.
-std::optional<cli::FoundDaemon> resolve(sd_bus* bus, const Instance& instance) {
+std::optional<FoundDaemon> resolve(sd_bus* bus, const Instance& instance) {
   Error error;
   sd_bus_message* answer = nullptr;
   if (sd_bus_call_method(bus, kAvahi, "/", kServer, "ResolveService", error.get(), &answer,
@@ -153,9 +155,9 @@ std::optional<cli::FoundDaemon> resolve(sd_bus* bus, const Instance& instance) {
                           &texts[2], &texts[3], &protocol, &texts[4], &port) < 0) {
     return std::nullopt;
   }
-  cli::FoundDaemon found;
-  found.set_name(harmless(texts[0]));
-  found.set_host(harmless(texts[3]));
+  FoundDaemon found;
+  found.set_name(base::printable(texts[0]));
+  found.set_host(base::printable(texts[3]));
   found.set_address(texts[4]);
   found.set_port(port);
   // A link-local address means something on one interface only.
@@ -168,9 +170,55 @@ std::optional<cli::FoundDaemon> resolve(sd_bus* bus, const Instance& instance) {
   return found;
 }
 
+/// The name of a daemon, with that of its machine unless it is named after it: other machines may
+/// have daemons of the same name.
+std::string name_of(const FoundDaemon& found) {
+  const auto cleaned = [](const std::string& text) {
+    std::string made;
+    for (const char c : text) {
+      const bool plain = std::isalnum(static_cast<unsigned char>(c)) != 0;
+      if (plain) made += c;
+      if (!plain && !made.empty() && made.back() != '_') made += '_';
+    }
+    while (!made.empty() && made.back() == '_') made.pop_back();
+    return made;
+  };
+  // Avahi calls the second daemon of a name "left #2", whichever came later.
+  const std::string name = cleaned(found.name().substr(0, found.name().find(" #")));
+  const std::string machine = cleaned(found.host().substr(0, found.host().find('.')));
+  std::string made = name.starts_with(machine) ? name : machine + "_" + name;
+  if (made.empty() || std::isdigit(static_cast<unsigned char>(made.front())) != 0) {
+    made.insert(0, "sensor_");
+  }
+  made.resize(std::min(made.size(), kMaxName - std::string_view("_65535").size()));
+  while (made.back() == '_') made.pop_back();
+  return made;
+}
+
+/// Of those that answer. All are asked at the same time.
+std::set<std::string> instances(const std::vector<NamedDaemon>& daemons) {
+  std::vector<std::future<std::string>> answers;
+  answers.reserve(daemons.size());
+  for (const NamedDaemon& one : daemons) {
+    answers.push_back(std::async(std::launch::async, [options = one.options]() mutable {
+      options.timeout = std::min<std::chrono::milliseconds>(options.timeout, kInstanceTimeout);
+      return client::Client(options).server().instance();
+    }));
+  }
+  std::set<std::string> all;
+  for (auto& answer : answers) {
+    try {
+      all.insert(answer.get());
+    } catch (const std::exception&) {
+      continue;  // it announces nothing, and its own connection says why it does not answer
+    }
+  }
+  return all;
+}
+
 }  // namespace
 
-void read_txt(const std::vector<std::string>& txt, cli::FoundDaemon& to) {
+void read_txt(const std::vector<std::string>& txt, FoundDaemon& to) {
   for (const auto& one : txt) {
     const auto split = one.find('=');
     if (split == std::string::npos) continue;
@@ -180,19 +228,20 @@ void read_txt(const std::vector<std::string>& txt, cli::FoundDaemon& to) {
     std::ranges::replace_if(value, [](unsigned char c) { return c < 0x20 || c > 0x7e; }, '?');
     if (key == "version") to.set_version(value);
     if (key == "serial") to.set_serial(value);
+    if (key == "instance") to.set_instance(value);
     if (key == "tls") to.set_tls(value == "1");
     if (key == "token") to.set_token(value == "1");
   }
 }
 
-std::vector<cli::FoundDaemon> browse(std::chrono::milliseconds timeout) {
+std::vector<FoundDaemon> browse(std::chrono::milliseconds timeout) {
   const Bus bus = open_bus();
-  std::vector<cli::FoundDaemon> all;
+  std::vector<FoundDaemon> all;
   for (const auto& instance : list_instances(bus.get(), timeout)) {
     if (auto found = resolve(bus.get(), instance)) all.push_back(*std::move(found));
   }
   // On several interfaces it may be the same.
-  const auto key = [](const cli::FoundDaemon& one) {
+  const auto key = [](const FoundDaemon& one) {
     return std::tie(one.name(), one.address(), one.host());
   };
   const auto same = [&](const auto& a, const auto& b) {
@@ -203,4 +252,75 @@ std::vector<cli::FoundDaemon> browse(std::chrono::milliseconds timeout) {
   return all;
 }
 
-}  // namespace dtact::ctl
+std::vector<Finder::Found> Finder::look(std::chrono::milliseconds timeout) {
+  return add(browse(timeout));
+}
+
+std::vector<Finder::Found> Finder::add(const std::vector<FoundDaemon>& all) {
+  std::vector<Found> changed;
+  std::set<std::pair<Place, std::string>> announced;
+  for (const FoundDaemon& one : all) announced.insert({{one.host(), one.port()}, one.address()});
+  std::optional<std::set<std::string>> named;  // once they are needed
+  for (const FoundDaemon& one : all) {
+    const Place place{one.host(), one.port()};
+    const auto known = known_.find(place);
+    if (known != known_.end()) {
+      // A daemon may have several addresses.
+      if (announced.contains({place, known->second.address})) continue;
+      known->second.address = one.address();
+      if (!known->second.name.empty()) changed.push_back(make(known->second.name, one));
+      continue;
+    }
+    if (known_.size() == kMaxFound) break;
+    Known& fresh = known_[place];
+    fresh.address = one.address();
+    if (!named) named = instances(named_);
+    std::string name = name_of(one);
+    if ((!one.instance().empty() && named->contains(one.instance())) ||
+        std::ranges::find(named_, name, &NamedDaemon::name) != named_.end()) {
+      continue;
+    }
+    if (!names_.insert(name).second) {
+      name += fmt::format("_{}", one.port());
+      names_.insert(name);
+    }
+    changed.push_back(make(name, one));
+    if (changed.back().refused.empty()) fresh.name = name;
+  }
+  return changed;
+}
+
+Finder::Found Finder::make(const std::string& name, const FoundDaemon& one) const {
+  Found found{{name, common_}, {}};
+  found.daemon.options.host = one.address();
+  found.daemon.options.port = static_cast<std::uint16_t>(one.port());
+  const bool tls = one.tls() && !common_.tls;
+  if (tls || (one.token() && common_.token.empty())) {
+    found.refused = fmt::format("{} at {}:{} asks for {}: name it with --daemon", name, one.host(),
+                                one.port(), tls ? "TLS" : "a token");
+  }
+  return found;
+}
+
+std::jthread watch_network(const client::Options& common, std::vector<NamedDaemon> named,
+                           std::function<void(Finder::Found)> found,
+                           std::function<void(const std::string&)> log) {
+  return std::jthread([finder = Finder(common, std::move(named)), found = std::move(found),
+                       log = std::move(log)](const std::stop_token& stop) mutable {
+    std::mutex mutex;
+    std::condition_variable_any stopped;
+    std::string reported;
+    while (!stop.stop_requested()) {
+      try {
+        for (Finder::Found& one : finder.look(std::chrono::seconds(1))) found(std::move(one));
+        reported.clear();
+      } catch (const std::exception& e) {
+        if (std::exchange(reported, e.what()) != e.what()) log(reported);
+      }
+      std::unique_lock lock(mutex);
+      stopped.wait_for(lock, stop, std::chrono::seconds(3), [] { return false; });
+    }
+  });
+}
+
+}  // namespace dtact::cli

@@ -1,0 +1,77 @@
+#pragma once
+
+#include <chrono>
+#include <functional>
+#include <map>
+#include <set>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "clients/common/daemon_option.hpp"
+#include "clients/common/reports.pb.h"
+
+namespace dtact::cli {
+
+/// Fills what the strings of a service's TXT record say ("key=value"); unknown keys are passed
+/// over.
+void read_txt(const std::vector<std::string>& txt, FoundDaemon& to);
+
+/// Every dtactd that this machine's avahi-daemon knows, one for each address, sorted by name. Ends
+/// when Avahi reports all known ones, or at the time limit. Throws Failure with a sentence
+/// when no avahi-daemon runs.
+[[nodiscard]] std::vector<FoundDaemon> browse(std::chrono::milliseconds timeout);
+
+inline constexpr const char* kNoneAnnounced =
+    "no dtactd announces itself: it does where it listens beyond its own machine (net.address, "
+    "net.announce) and avahi-daemon runs beside it";
+
+/// Daemons that announce themselves, for programs that serve several: each once, under a name that
+/// can be part of addresses and topics. Those that the user named are left out.
+class Finder {
+ public:
+  struct Found {
+    /// MACHINE_NAME, or NAME alone where that begins with the machine's.
+    NamedDaemon daemon;
+    /// A sentence where the daemon asks for TLS or a token and this program was given none.
+    std::string refused;
+  };
+
+  /// `common` is what each is connected to with, besides its address. Whether one is of `named`
+  /// its name or its instance tells; for the latter those are connected to when new ones appear.
+  explicit Finder(client::Options common, std::vector<NamedDaemon> named = {})
+      : common_(std::move(common)), named_(std::move(named)) {}
+
+  /// Browses; returns those that are new since the last call and, under the same name, those that
+  /// have left the address that they were found at. Throws as browse().
+  [[nodiscard]] std::vector<Found> look(std::chrono::milliseconds timeout);
+  /// The same of `all`; of any number in a network, the first kMaxFound.
+  [[nodiscard]] std::vector<Found> add(const std::vector<FoundDaemon>& all);
+
+  static constexpr std::size_t kMaxFound = 1000;
+
+ private:
+  using Place = std::pair<std::string, std::uint32_t>;  ///< Host and port.
+  /// What a daemon is called, and its address. Without a name it is of no use.
+  struct Known {
+    std::string name;
+    std::string address;
+  };
+
+  [[nodiscard]] Found make(const std::string& name, const FoundDaemon& one) const;
+
+  client::Options common_;
+  std::vector<NamedDaemon> named_;
+  std::map<Place, Known> known_;
+  std::set<std::string> names_;
+};
+
+/// Calls `found` for each daemon as it appears or has another address (see Finder), and `log` with
+/// what goes wrong, on a thread that looks every few seconds until the result is destroyed.
+[[nodiscard]] std::jthread watch_network(const client::Options& common,
+                                         std::vector<NamedDaemon> named,
+                                         std::function<void(Finder::Found)> found,
+                                         std::function<void(const std::string&)> log);
+
+}  // namespace dtact::cli
