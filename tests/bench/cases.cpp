@@ -149,7 +149,7 @@ class DaemonFrame {
   }
   [[nodiscard]] Told tell(const recon::DepthSums& sums, pipeline::ContactDetector& contact) const {
     constexpr double kLutUm = 20;
-    return {contact.inspect(sums, grid().width, grid().height, model_->mm_per_px),
+    return {contact.inspect(sums, grid().width, grid().height, model_->mm_per_px, {}),
             pipeline::uncertainty_at_um(kLutUm, pipeline::bend_um(sums, model_->mm_per_px),
                                         model_->rectify.decimation)};
   }

@@ -13,12 +13,14 @@
 
 namespace dtact::e2e {
 
-/// Limits of growth after an attack, where nothing may be held.
+/// Limits of growth after an attack, where nothing may be held, and of what is held at any time.
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 // Sanitizers keep up to 256 MiB of freed memory, to detect its use (quarantine_size_mb).
 inline constexpr std::int64_t kMemorySlackKib = (256 + 8) * 1024;
+inline constexpr std::int64_t kMaxResidentKib = 1024 * 1024;
 #else
 inline constexpr std::int64_t kMemorySlackKib = 8 * 1024;
+inline constexpr std::int64_t kMaxResidentKib = 150 * 1024;
 #endif
 
 /// Resources of a process, as the kernel counts them.
@@ -30,52 +32,71 @@ struct Held {
 [[nodiscard]] Held held_by(pid_t pid);
 void forget_peak(pid_t pid);
 
-/// A client that does nothing but stream depth, on a thread of its own.
-class HonestClient {
+/// A viewer that does nothing but stream depth and a client that sends a command again and again,
+/// each on a thread and a connection of its own.
+class HonestClients {
  public:
-  explicit HonestClient(client::Client client);
-  ~HonestClient();
-  HonestClient(const HonestClient&) = delete;
-  HonestClient& operator=(const HonestClient&) = delete;
+  HonestClients(client::Client viewer, client::Client commander);
+  ~HonestClients();
+  HonestClients(const HonestClients&) = delete;
+  HonestClients& operator=(const HonestClients&) = delete;
 
-  /// Waits for `frames` more frames. False when the connection broke or none came for a minute.
-  [[nodiscard]] bool receives(std::size_t frames) const;
-  /// Latency from capture to here of all frames since the last call, 99th percentile, milliseconds.
-  [[nodiscard]] double take_p99_ms();
-  /// Why the connection ended; empty while it lives.
+  /// Waits for `frames` more frames and a command. False when a connection broke, a command was
+  /// refused or none came for a minute.
+  [[nodiscard]] bool receive(std::size_t frames) const;
+  /// What they got since the last call.
+  struct Served {
+    double p99_ms = 0;  ///< Latency of the frames, from capture to here.
+    std::uint64_t frames = 0;
+    std::uint64_t missed = 0;  ///< Frames that the daemon made and did not send.
+    std::size_t commands = 0;
+    /// Frames that came while the slowest command waited: time that a busy machine does not
+    /// stretch.
+    std::uint64_t slowest = 0;
+  };
+  [[nodiscard]] Served take();
+  /// Why a connection ended; empty while both live.
   [[nodiscard]] std::string broken() const;
 
  private:
-  void run();
+  void view(client::Client client);
+  void command(client::Client client);
 
-  client::Client client_;
   mutable std::mutex mutex_;
   std::vector<std::int64_t> delays_ns_;
+  std::uint64_t dropped_ = 0;  ///< Since the viewer connected.
+  Served served_;
   std::string broken_;
-  std::atomic<std::size_t> frames_{0};
+  std::atomic<std::uint64_t> frames_{0};
+  std::atomic<std::uint64_t> commands_{0};
   std::atomic<bool> stop_{false};
-  std::thread thread_;
+  std::thread viewer_;
+  std::thread commander_;
 };
 
-/// A daemon on the simulated sensor with an honest client, before and after an attack.
+/// A daemon on the simulated sensor with honest clients, before, during and after attacks. Asserts
+/// at its end that the daemon has not crashed.
 class Besieged {
  public:
   /// `settings`: of the daemon, KEY=VALUE.
   explicit Besieged(const std::vector<std::string>& settings = {});
+  ~Besieged();
+  Besieged(const Besieged&) = delete;
+  Besieged& operator=(const Besieged&) = delete;
 
   [[nodiscard]] std::uint16_t port() const { return sensor_.daemon->port(); }
   [[nodiscard]] const Sensor& sensor() const { return sensor_; }
   [[nodiscard]] pid_t pid() const { return sensor_.daemon->pid(); }
-  [[nodiscard]] HonestClient& honest() { return honest_; }
+  [[nodiscard]] HonestClients& honest() { return honest_; }
 
-  /// Resources noted by begin().
-  [[nodiscard]] const Held& before() const { return before_; }
+  /// Resources at rest: before the first attack.
+  [[nodiscard]] const Held& at_rest() const { return at_rest_; }
 
   /// Notes the state after a second without an attack.
   void begin();
-  /// Asserts that nothing of the attack is left: memory, descriptors, the honest client, service
-  /// for new clients. Prints the cost; a loaded machine misses frames by itself, which is not a
-  /// failure.
+  /// Asserts that memory stayed within bounds, that the honest clients were served throughout and
+  /// that nothing of the attack is left: memory, descriptors, service for new clients. Prints the
+  /// cost; a loaded machine misses frames of the camera by itself, which is not a failure.
   void end(const std::string& attack);
 
  private:
@@ -87,8 +108,8 @@ class Besieged {
   [[nodiscard]] Missed missed() const;
 
   Sensor sensor_;
-  HonestClient honest_;
-  Held before_;
+  HonestClients honest_;
+  Held at_rest_;
   Missed missed_before_;
   double idle_p99_ms_ = 0;
 };

@@ -1,16 +1,16 @@
 #!/usr/bin/env bash
 # A real avahi-daemon on a bus and in a network namespace in which only loopback is up: dtactd
-# announces itself there and dtactctl finds it. discovery_test.sh DTACTD DTACTCTL
+# announces itself there and the clients find it. discovery_test.sh DTACTD DTACTCTL DTACT_DDS DTACT_WEB
 set -euo pipefail
-daemon=$1 ctl=$2
+daemon=$1 ctl=$2 dds=$3 web=$4
 
-if [[ ${3-} != inside ]]; then
+if [[ ${5-} != inside ]]; then
   for program in avahi-daemon dbus-daemon ip unshare; do
     command -v "$program" >/dev/null || PATH=$PATH:/usr/sbin:/sbin command -v "$program" >/dev/null ||
       { echo "skipped: $program is not installed"; exit 77; }
   done
   unshare --net --mount --map-root-user true 2>/dev/null || { echo "skipped: no namespaces can be made here"; exit 77; }
-  exec unshare --net --mount --map-root-user "$0" "$daemon" "$ctl" inside
+  exec unshare --net --mount --map-root-user "$0" "$daemon" "$ctl" "$dds" "$web" inside
 fi
 
 PATH=$PATH:/usr/sbin:/sbin
@@ -100,11 +100,40 @@ start_daemon alone
 start_daemon quiet net.address=192.0.2.7 net.announce=false
 "$ctl" find --json >"$folder/find.log"
 (($(wc -l <"$folder/find.log") == 2)) || fail 'not two were found'
+# They are asked together; none serves, as it has no camera.
+! "$ctl" fleet status >"$folder/fleet.log" 2>&1 || fail 'a fleet without cameras is well'
+says fleet 'dtactctl: 2 of 2 not well: gripper' || fail 'not two were asked'
+! says fleet 'not answer' || fail 'one did not answer'
 ! says alone announced || fail 'announced from loopback'
 ! says quiet announced || fail 'announced against its configuration'
 
+# On the ROS 2 graph two daemons of one name are two, and one that is both named and found is one.
+start_daemon third net.address=192.0.2.7 net.name=left
+"$dds" --find --daemon "mine=192.0.2.7:$port" --domain 20 >"$folder/dds.log" 2>&1 &
+jobs+=($!)
+within 30 says dds "gripper_left is there: dtactd"
+three() { (($(grep -c "^[[:alnum:]_]* is there" "$folder/dds.log") == 3)); }
+within 30 three
+says dds 'mine is there' || fail 'the one that was named is not there'
+
+# The page has them by the same names.
+"$web" --find --daemon "mine=192.0.2.7:$port" --listen-port 0 >"$folder/web.log" 2>&1 &
+jobs+=($!)
+within 30 says web 'the daemon of gripper_left is there: dtactd'
+(($(grep -c '^found gripper_' "$folder/web.log") == 2)) || fail 'the page has not two besides the one that was named'
+three || fail 'the graph has more than three'
+
 # A daemon that ends disappears.
 kill "${jobs[1]}"
-gone() { "$ctl" find --json >"$folder/find.log"; (($(wc -l <"$folder/find.log") == 1)); }
+gone() { "$ctl" find --json >"$folder/find.log"; (($(wc -l <"$folder/find.log") == 2)); }
 within 30 gone
-echo 'announced, found, gone'
+
+# A daemon whose machine gets another address is reached there when its connection is lost.
+ip address add 192.0.2.8/32 dev lo
+ip address delete 192.0.2.7/32 dev lo
+within 60 says web 'is at 192.0.2.8:'
+within 60 says dds 'is at 192.0.2.8:'
+back() { (($(grep -c "^$1" "$folder/$2.log") >= $3)); }
+within 60 back 'gripper_[[:alnum:]_]* is there' dds 3
+within 60 back 'the daemon of gripper_[[:alnum:]_]* is there' web 3
+echo 'announced, found, gone, moved'

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
@@ -133,6 +134,71 @@ TEST_P(PointsOfABall, LieOnIt) {
                     error.degrees);
         EXPECT_LT(error.mm, 0.03);
         EXPECT_LT(error.degrees, 3);
+        return ++frames == 5;
+      },
+      std::chrono::seconds(60)));
+}
+
+// A point pressed in by 1 mm appears 0.33 mm farther out, 8 mm beside the axis of a camera that is
+// 25 mm above.
+TEST(Points, OfABallBesideTheAxisLieOnItWhereItIs) {
+  constexpr double kX = -6.6;
+  constexpr double kY = 4.5;
+  constexpr std::uint64_t kHeld = 252;  // 4.2 s: the ball is at rest
+  const TempFolder folder;
+  const std::filesystem::path scene_file = folder.path() / "beside.toml";
+  base::write_file_atomically(scene_file, fmt::format(R"([surface]
+camera_mm = 25.0
+[[press]]
+object = "ball"
+radius_mm = 4.0
+keys = [ {{ t = 3.0, x = {}, y = {}, depth = -0.3 }}, {{ t = 4.0, depth = 1.0 }} ]
+)",
+                                                      kX, kY));
+  const std::filesystem::path calibration = folder.path() / "calibration";
+  std::filesystem::copy(calibration_folder(), calibration);
+  const std::filesystem::path file = calibration / "calibration.toml";
+  std::string text = base::read_file(file, 1 << 20);
+  const std::size_t height = text.find("\nper_mm = ") + 1;
+  text.replace(height, text.find(' ', height + 9) - height, "per_mm = 0.04");
+  base::write_file_atomically(file, text);
+  const Sensor sensor(scene_file, false, {"calibration=" + calibration.string()});
+  const Perceive perceive(sensor);
+  client::Client client = perceive.connect();
+  v1::Subscribe subscription;
+  subscription.set_cloud(v1::CLOUD_FLOAT32);
+  subscription.set_contact_box(true);
+  client.subscribe(subscription);
+  int frames = 0;
+  ASSERT_TRUE(read_until(
+      client,
+      [&](const Item& item) {
+        const auto* frame = std::get_if<v1::Frame>(&item);
+        if (frame == nullptr || !frame->has_cloud() || frame->sequence() < kHeld) {
+          return false;
+        }
+        const v1::Contact& contact = frame->contact();
+        EXPECT_NEAR(contact.x_mm(), kX, 0.02);
+        EXPECT_NEAR(contact.y_mm(), kY, 0.02);
+        const std::size_t size = std::size_t{frame->cloud().width()} * frame->cloud().height();
+        std::vector<float> values(6 * size);
+        EXPECT_EQ(frame->cloud().data().size(), values.size() * sizeof(float));
+        std::memcpy(values.data(), frame->cloud().data().data(), values.size() * sizeof(float));
+        double distance = 0;
+        int points = 0;
+        for (std::size_t i = 0; i < size; ++i) {
+          const cv::Vec3d point =
+              1e3 * cv::Vec3d(values[i], values[size + i], values[2 * size + i]);
+          const cv::Vec3d from_middle = point - cv::Vec3d(kX, kY, 3);
+          // Inside of the contact, which is 2.6 mm wide.
+          if (!(std::hypot(from_middle[0], from_middle[1]) < 2)) continue;
+          distance += std::abs(cv::norm(from_middle) - 4);
+          ++points;
+        }
+        EXPECT_GT(points, 5000);
+        std::printf("contact at %.4f, %.4f; points %.4f mm off\n", contact.x_mm(), contact.y_mm(),
+                    distance / points);
+        EXPECT_LT(distance / points, 0.012);
         return ++frames == 5;
       },
       std::chrono::seconds(60)));

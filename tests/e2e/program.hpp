@@ -2,6 +2,7 @@
 
 #include <sys/types.h>
 
+#include <cstdint>
 #include <filesystem>
 #include <string>
 #include <utility>
@@ -21,6 +22,9 @@ class TempFolder {
  private:
   std::filesystem::path path_;
 };
+
+/// A TCP port of loopback that nobody listens on at this moment.
+[[nodiscard]] std::uint16_t free_port();
 
 /// Runs a program to its end. Returns its exit status (128 + signal when it was killed); `output`
 /// receives what it printed on both streams; `input` is what it reads.

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cstdio>
 #include <fstream>
+#include <functional>
+#include <iterator>
 #include <map>
 
 #include "hal/base/atomic_file.hpp"
@@ -82,7 +84,8 @@ Pressed next_press(client::Client& client, const hal::sim::Truth& truth) {
   return pressed;
 }
 
-TEST(Reference, HalvedLightKeepsTheMillimetres) {
+/// `halve` halves the picture's brightness.
+void expect_the_same_depth(const std::function<void(client::Client&)>& halve) {
   const TempFolder folder;
   const Sensor sensor(write_scene(folder));
   const hal::sim::Truth truth(hal::sim::load_scene(folder.path() / "presses.toml"));
@@ -91,9 +94,7 @@ TEST(Reference, HalvedLightKeepsTheMillimetres) {
 
   const Pressed bright = next_press(client, truth);
   ASSERT_TRUE(wait_contact(client, false));
-  v1::SetLight half;
-  half.set_brightness(128);
-  EXPECT_EQ(client.set_light(half).brightness(), 128U);
+  halve(client);
 
   bool unsettled = false;
   ASSERT_TRUE(read_until(client, [&](const Item& item) {
@@ -115,6 +116,68 @@ TEST(Reference, HalvedLightKeepsTheMillimetres) {
       bright.depth_mm, dim.depth_mm, bright.truth_mm);
   EXPECT_NEAR(dim.depth_mm, bright.depth_mm, 0.03);
   EXPECT_NEAR(bright.depth_mm, bright.truth_mm, 0.05);
+}
+
+TEST(Reference, HalvedLightKeepsTheMillimetres) {
+  expect_the_same_depth([](client::Client& client) {
+    v1::SetLight half;
+    half.set_brightness(128);
+    EXPECT_EQ(client.set_light(half).brightness(), 128U);
+  });
+}
+
+TEST(Reference, HalvedExposureKeepsTheMillimetres) {
+  expect_the_same_depth([](client::Client& client) {
+    v1::SetCamera half;
+    half.set_exposure_us(5000);
+    const v1::CameraSettings now = client.set_camera(half);
+    EXPECT_EQ(now.exposure_us().value(), 5000);
+    EXPECT_EQ(now.gain().value(), 1);
+  });
+}
+
+/// The calibration as a guided session makes it, which knows the camera's exposure.
+std::filesystem::path with_exposure(const TempFolder& folder) {
+  std::filesystem::path copy = folder.path() / "calibration";
+  std::filesystem::copy(calibration_folder(), copy);
+  std::ifstream file(copy / "calibration.toml");
+  std::string text{std::istreambuf_iterator<char>(file), {}};
+  const std::string table = "[camera.controls]\n";
+  text.insert(text.find(table) + table.size(), "exposure_permille = 1000\n");
+  base::write_file_atomically(copy / "calibration.toml", text);
+  return copy;
+}
+
+TEST(Reference, AnotherExposureThanTheCalibrationsIsNamedUntilItIsSetBack) {
+  const TempFolder folder;
+  const Sensor sensor(scene_file("nothing.toml"), false,
+                      {"calibration=" + with_exposure(folder).string()});
+  client::Client client = sensor.connect();
+  client.subscribe();
+  ASSERT_TRUE(wait_contact(client, false));
+  EXPECT_FALSE(has(client.status().health(), v1::HEALTH_CAMERA_MISMATCH));
+  for (const double exposure_us : {4170.0, 10000.0}) {
+    v1::SetCamera change;
+    change.set_exposure_us(exposure_us);
+    EXPECT_NEAR(client.set_camera(change).exposure_us().value(), exposure_us, 0.01);
+    EXPECT_TRUE(wait_reference(client));
+    EXPECT_TRUE(read_until(client, [&](const Item& item) {
+      const auto* frame = std::get_if<v1::Frame>(&item);
+      return frame != nullptr && frame->has_depth() &&
+             has(frame->health(), v1::HEALTH_CAMERA_MISMATCH) == (exposure_us != 10000.0);
+    }));
+  }
+  v1::SetCamera beyond;
+  beyond.set_gain(3);
+  try {
+    (void)client.set_camera(beyond);
+    ADD_FAILURE() << "a gain beyond the camera's";
+  } catch (const client::Refused& e) {
+    EXPECT_EQ(e.code(), v1::ERROR_INVALID);
+    EXPECT_NE(std::string(e.what()).find("set_camera.gain: 3; this camera has 1 to 2"),
+              std::string::npos)
+        << e.what();
+  }
 }
 
 TEST(Reference, RezeroIsRefusedUnderContactUnlessForced) {

@@ -11,6 +11,7 @@
 #include <optional>
 
 #include "clients/cpp/client.hpp"
+#include "proto/fingerprint.hpp"
 #include "tests/e2e/daemon_process.hpp"
 #include "tests/fakes/notify_socket.hpp"
 
@@ -32,7 +33,7 @@ class Reload : public testing::Test {
  protected:
   Reload() {
     old_ = make_pair_in("old");
-    write("tokens", std::string("control ") + kOldToken + "\n");
+    write("tokens", "control " + wire::token_hash(kOldToken) + "\n");
     write("dtactd.toml", configuration("old", ""));
     daemon_ = std::make_unique<DaemonProcess>(
         std::vector<std::string>{"--config", file("dtactd.toml")},
@@ -92,7 +93,7 @@ class Reload : public testing::Test {
 TEST_F(Reload, TakesCertificateTokensAndLimits) {
   auto before = connect(old_, kOldToken);
   const std::string renewed = make_pair_in("new");
-  write("tokens", std::string("view ") + kNewToken + "\n");
+  write("tokens", "view " + wire::token_hash(kNewToken) + "\n");
   write("dtactd.toml", configuration("new", "max_clients = 2\n"));
   EXPECT_THAT(reload(),
               AllOf(HasSubstr("fps"), Not(HasSubstr("restart")),
@@ -121,12 +122,12 @@ TEST_F(Reload, AMistakeLeavesEverythingAsItWas) {
   // The same for a mistake that only the named files have.
   write("dtactd.toml", configuration("old", "max_clients = 1\n"));
   write("tokens", "control short\n");
-  EXPECT_THAT(reload(), HasSubstr("tokens:1: the token has 5 bytes"));
+  EXPECT_THAT(reload(), HasSubstr("tokens:1: a token itself must not be kept"));
   const auto one = connect(old_, kOldToken);
   const auto two = connect(old_, kOldToken);
   EXPECT_EQ(two->server().rights(), v1::RIGHTS_CONTROL);
   // Once fixed, the reload succeeds.
-  write("tokens", std::string("control ") + kOldToken + "\n");
+  write("tokens", "control " + wire::token_hash(kOldToken) + "\n");
   EXPECT_THAT(reload(), Not(HasSubstr("stays")));
   EXPECT_THROW((void)connect(old_, kOldToken), client::EndedByDaemon);  // max_clients = 1
 }
@@ -206,10 +207,11 @@ class CheckOfFiles : public testing::Test {
 
 // Otherwise `systemctl reload` would succeed although the daemon keeps its old settings.
 TEST_F(CheckOfFiles, FindsBrokenTokens) {
-  const std::string tokens = write("tokens", std::string("view ") + kNewToken + "\n");
+  const std::string tokens = write("tokens", "view " + wire::token_hash(kNewToken) + "\n");
   EXPECT_EQ(check({"tokens=" + tokens}), "");
   (void)write("tokens", "view short\n");
-  EXPECT_THAT(check({"tokens=" + tokens}), HasSubstr(tokens + ":1: the token has 5 bytes"));
+  EXPECT_THAT(check({"tokens=" + tokens}),
+              HasSubstr(tokens + ":1: a token itself must not be kept"));
   EXPECT_THAT(check({"tokens=" + tokens + "-gone"}), HasSubstr("tokens-gone: No such file"));
 }
 
@@ -239,7 +241,7 @@ TEST_F(CheckOfFiles, LooksAtCredentialsWhereThereAreAny) {
   ::setenv("CREDENTIALS_DIRECTORY", folder_.path().c_str(), 1);
   EXPECT_THAT(check({all[0]}), HasSubstr("/etc/credstore/dtactd.tokens"));
   (void)write("tokens", "view short\n");
-  EXPECT_THAT(check({all[0]}), HasSubstr("tokens:1: the token has 5 bytes"));
+  EXPECT_THAT(check({all[0]}), HasSubstr("tokens:1: a token itself must not be kept"));
 }
 
 TEST(Credentials, OneThatIsMissingNamesWhereToPutIt) {

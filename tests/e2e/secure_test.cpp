@@ -31,10 +31,8 @@ class Secure : public testing::Test {
     fingerprint_.resize(64);
     std::ofstream tokens(file("tokens"));
     for (const char* rights : {"view", "control"}) {
-      const std::string line = ctl({"token", "--new", rights});
-      tokens << line;
-      const std::string token = line.substr(line.find(' ') + 1);
-      (rights == std::string("view") ? view_ : control_) = token.substr(0, token.find('\n'));
+      tokens << ctl({"token", "--new", rights, "-o", file(rights)});
+      (rights == std::string("view") ? view_ : control_) = client::read_token(file(rights));
     }
     tokens.close();
     fs::permissions(file("tokens"), fs::perms::owner_read | fs::perms::owner_write);

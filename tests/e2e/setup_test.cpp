@@ -1,11 +1,8 @@
 // dtactctl setup on the simulated sensor, with a systemctl of the test's own: from a configuration
 // of another camera to a calibrated service.
-#include <arpa/inet.h>
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <netinet/in.h>
-#include <sys/socket.h>
 
 #include <algorithm>
 #include <chrono>
@@ -14,7 +11,6 @@
 #include <thread>
 
 #include "hal/base/atomic_file.hpp"
-#include "hal/base/unique_fd.hpp"
 #include "tests/e2e/sensor.hpp"
 
 namespace dtact::e2e {
@@ -26,20 +22,6 @@ using testing::HasSubstr;
 using testing::Not;
 
 constexpr int kNotMet = 4;
-
-/// A port that nobody listens on.
-std::uint16_t free_port() {
-  const base::UniqueFd fd(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0));
-  sockaddr_in address{};
-  address.sin_family = AF_INET;
-  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-  socklen_t size = sizeof address;
-  if (::bind(fd.get(), reinterpret_cast<sockaddr*>(&address), size) != 0 ||
-      ::getsockname(fd.get(), reinterpret_cast<sockaddr*>(&address), &size) != 0) {
-    throw std::runtime_error("no free port");
-  }
-  return ntohs(address.sin_port);
-}
 
 /// A machine with a service: its configuration, the programs in one folder, and a systemctl that
 /// starts the daemon anew.
@@ -146,7 +128,7 @@ TEST_F(Setup, StopsWithWhatToDoAndHowToGoOn) {
   EXPECT_EQ(setup({"restart", "--unit", "dtactd@none"}), kNotMet);
   EXPECT_THAT(output_, HasSubstr("the service does not start: systemctl status dtactd@none"));
   EXPECT_EQ(setup({"calibrate"}), kNotMet);
-  EXPECT_THAT(output_, HasSubstr("give --radius-mm, and --mm-per-px or --lens"));
+  EXPECT_THAT(output_, HasSubstr("give --radius-mm, and --mm-per-px, --ruler or --lens"));
   EXPECT_EQ(setup({"guess"}), 2);
 }
 

@@ -35,7 +35,8 @@ class FakeCamera final : public hal::Camera, private hal::FrameOwner {
                          .height = kToyHeight,
                          .fps = 25,  // promised: even an emulator reaches it, so it is never slow
                          .light_delay_frames = 2,
-                         .controls = {}};
+                         .controls = {},
+                         .settings = {}};
     bool refuse_start = false;
 
     void show(const ToyScene& scene) {

@@ -32,7 +32,8 @@ class JpegCamera final : public hal::Camera, private hal::FrameOwner {
             .height = buffer_.height(),
             .fps = 100,  // promised: less than it has, so that it is never slow
             .light_delay_frames = 2,
-            .controls = {}};
+            .controls = {},
+            .settings = {}};
   }
   [[nodiscard]] hal::CameraReport report() const override { return {}; }
   void start() override {}

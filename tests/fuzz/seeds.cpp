@@ -92,6 +92,10 @@ void add_requests(const Corpus& corpus) {
        })},
       {"get_reference", request([](M& m) { m.mutable_get_reference(); })},
       {"ping", request([](M& m) { m.mutable_ping(); })},
+      {"set_camera", request([](M& m) {
+         m.mutable_set_camera()->set_exposure_us(4170);
+         m.mutable_set_camera()->set_gain(1.5);
+       })},
       {"set_reconstruction", request([](M& m) {
          m.mutable_set_reconstruction()->set_resolution("half");
          m.mutable_set_reconstruction()->set_sharpen("auto");

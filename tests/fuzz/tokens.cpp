@@ -1,5 +1,5 @@
 // A token file: an accepted one grants the rights that its own lines name and nothing else; a
-// refused one gets a message that reveals no token.
+// refused one gets a message that is a sentence.
 #include "daemon/serve/tokens.hpp"
 
 #include <sstream>
@@ -15,19 +15,17 @@ void use(const net::Tokens& tokens, const std::string& text) {
   std::istringstream lines(text);
   for (std::string line; std::getline(lines, line);) {
     std::istringstream words(line);
-    std::string rights;
-    std::string token;
-    words >> rights >> token;
-    if (rights.empty() || rights.front() == '#') continue;
-    const auto grant = tokens.find(token);
-    require(grant.has_value(), "every line's token is known");
-    const auto said = rights == "view"      ? net::Rights::view
-                      : rights == "control" ? net::Rights::control
-                                            : net::Rights::calibrate;
-    require(grant->rights == said, "a token grants what its line says");
-    const std::string other = token + "x";
-    require(text.find(other) != std::string::npos || !tokens.find(other),
-            "what stands nowhere in the file grants nothing");
+    std::string said;
+    std::string hash;
+    words >> said >> hash;
+    if (said.empty() || said.front() == '#') continue;
+    for (const auto& [word, rights] : {std::pair("view", net::Rights::view),
+                                       {"control", net::Rights::control},
+                                       {"calibrate", net::Rights::calibrate}}) {
+      require(tokens.holds({rights, {}, hash}) == (said == word),
+              "a line grants the rights that it names");
+    }
+    require(!tokens.find(hash), "a hash grants nothing to a client that shows it");
     granted = true;
   }
   require(granted, "a file that grants nothing is refused");

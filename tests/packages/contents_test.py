@@ -59,6 +59,15 @@ FILES = {
         /usr/share/dtact/foxglove-layout.json
         /usr/share/dtact/foxglove/dtact-live.json
         /usr/share/dtact/foxglove/dtact-points.json""",
+    "dtact-dds": """
+        /usr/bin/dtact-dds
+        UNITS/dtact-dds.service
+        /usr/share/bash-completion/completions/dtact-dds
+        /usr/share/dtact_msgs/CMakeLists.txt
+        /usr/share/dtact_msgs/msg/Contact.msg
+        /usr/share/dtact_msgs/package.xml
+        /usr/share/man/man1/dtact-dds.1.gz
+        /usr/share/zsh/vendor-completions/_dtact-dds""",
     "libdtact1": """
         LIB/libdtact.so.1""",
     "libdtact-dev": """
@@ -87,6 +96,8 @@ PLACES = {
     r"/usr/share/(bash|zsh)",
     "dtact-tools": r"/usr/bin/dtact(ctl|-calibrate|-perceive|-web)$|/usr/share/(bash|zsh)|/usr/share/dtact/foxglove|"
     r"(/usr)?/lib/systemd/system/dtact-(perceive|web)\.service$|/usr/share/man/man1/dtact",
+    "dtact-dds": r"/usr/bin/dtact-dds$|/usr/share/(bash|zsh|dtact_msgs)|(/usr)?/lib/systemd/system/dtact-dds\.service$|"
+    r"/usr/share/man/man1/dtact-dds",
     "libdtact1": r"LIB/libdtact\.so\.1$",
     "libdtact-dev": r"/usr/include/dtact/|LIB/(cmake/dtact/|libdtact\.so$|pkgconfig/dtact\.pc$)|"
     r"/usr/share/dtact/proto/",
@@ -131,7 +142,7 @@ def triplet() -> str:
 class Contents(unittest.TestCase):
     def test_the_packages_are_these(self) -> None:
         names = sorted(path.name.split("_")[0] for path in FOLDER.glob("*.deb") if "-dbgsym_" not in path.name)
-        self.assertEqual(names, ["dtact-tools", "dtactd", "libdtact-dev", "libdtact1", "python3-dtact"])
+        self.assertEqual(names, ["dtact-dds", "dtact-tools", "dtactd", "libdtact-dev", "libdtact1", "python3-dtact"])
 
     def test_each_holds_its_files_and_no_others(self) -> None:
         for name, expected in FILES.items():
@@ -186,6 +197,7 @@ class Contents(unittest.TestCase):
         self.assertRegex(postinst, f"deb-systemd-invoke try-restart {both}")
         self.assertNotRegex(postinst, "deb-systemd-invoke (?!try-restart )")
         self.assertRegex(control("dtact-tools", "prerm"), f"deb-systemd-invoke stop {both}")
+        self.assertRegex(control("dtact-dds", "prerm"), "deb-systemd-invoke stop '?dtact-dds.service")
         for unit in ("dtact-perceive.service", "dtact-web.service"):
             # It is enabled again where it had been enabled, and nowhere else.
             self.assertIn(f"deb-systemd-helper debian-installed '{unit}'", postinst)

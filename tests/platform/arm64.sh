@@ -18,7 +18,7 @@ foreign=()
 for package in "$@"; do
   case $package in
     libcli11-dev | libeigen3-dev) foreign+=("$package") ;;  # these have no architecture
-    lib* | prometheus-cpp-dev | umockdev) foreign+=("$package:arm64") ;;
+    lib* | cyclonedds-dev | prometheus-cpp-dev | umockdev) foreign+=("$package:arm64") ;;
     *) foreign+=("$package") ;;
   esac
 done

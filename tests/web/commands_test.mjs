@@ -66,6 +66,44 @@ test("slider, scheme and colour change the simulated light", async () => {
   );
 });
 
+test("exposure and gain are changed within the camera's range, and refused beyond in words", async () => {
+  const panel = pane.getByLabel("Camera", { exact: true });
+  // Shown with the first status.
+  await until(
+    () => panel.textContent(),
+    (text) => text.includes("Exposureµs2500 to 20000Gain1 to 2"),
+    10_000,
+  );
+  await panel.locator("summary").click();
+  const exposure = panel.getByLabel("Exposure");
+  await exposure.fill("4170");
+  await exposure.press("Enter");
+  await until(
+    () => status(left).camera.settings.exposure_us.value,
+    (value) => Math.abs(value - 4170) < 0.01,
+    10_000,
+  );
+  await until(
+    () => panel.locator(".answer").textContent(),
+    (text) => text.startsWith("Set until the daemon ends"),
+    10_000,
+  );
+  await panel.getByLabel("Gain").fill("7");
+  await panel.getByLabel("Gain").press("Enter");
+  await until(
+    () => panel.locator(".answer").textContent(),
+    (text) => text === "set_camera.gain: 7; this camera has 1 to 2",
+    10_000,
+  );
+  await exposure.fill("10000");
+  await exposure.press("Enter");
+  await until(
+    () => status(left).camera.settings.exposure_us.value,
+    (value) => value === 10000,
+    10_000,
+  );
+});
+
 test("depth is made as the panel says, and its worth and time are on the chart", async () => {
   const panel = pane.getByLabel("Speed and accuracy");
   const reported = () => panel.locator("[data-fact=worth]").textContent();

@@ -5,7 +5,7 @@ import { readdirSync } from "node:fs";
 import path from "node:path";
 import { after, before, test } from "node:test";
 import { fileURLToPath } from "node:url";
-import { open, until } from "./browser.mjs";
+import { fact, open, until } from "./browser.mjs";
 import { startDaemon, startGateway, status, stopAll, tokenFile, work } from "./programs.mjs";
 
 const here = path.dirname(fileURLToPath(import.meta.url));
@@ -23,6 +23,11 @@ before(async () => {
   ]);
   view = await open(await startGateway({ left: left.port }, ["--work-folder", folder]));
   pane = view.page.locator('[data-sensor="left"]');
+  // Without a connection the form has no values.
+  await until(
+    () => fact(pane, "map").textContent(),
+    (text) => text.startsWith("500 × 400"),
+  );
 });
 
 after(async () => {
@@ -98,6 +103,50 @@ test("presses become a calibration that the daemon uses", async () => {
   );
 });
 
+test("the scale comes from a line along a known length", async () => {
+  await pane.getByRole("radio", { name: "Camera" }).click();
+  await pane.getByRole("radio", { name: "Line" }).click();
+  const marks = pane.locator("canvas.marks");
+  const point = async (x, y) => {
+    const box = await marks.boundingBox();
+    await view.page.mouse.move(box.x + x * box.width, box.y + y * box.height);
+  };
+  // Once the camera's picture is there, which has another shape.
+  await until(
+    async () => {
+      await point(0.3, 0.3);
+      return pane.locator(".readout").textContent();
+    },
+    (text) => text.startsWith("grey"),
+    10_000,
+  );
+  await point(0.2, 0.3);
+  await view.page.mouse.down();
+  await point(0.5, 0.7);
+  await view.page.mouse.up();
+  // 800 x 600: 240 columns and 240 rows, but for a pixel at each end.
+  const pixels = Number(/A–B ([\d.]+) pixels/.exec(await pane.locator(".readout").textContent())[1]);
+  assert.ok(Math.abs(pixels - 339.4) < 3, `${pixels}`);
+  await pane.getByRole("button", { name: "Calibrate…" }).click();
+  const guide = view.page.getByRole("dialog", { name: "Guided calibration" });
+  await guide.getByLabel("Length of the drawn line, mm").fill("14");
+  const scale = Number(await guide.getByLabel("Millimetres per pixel").inputValue());
+  assert.ok(Math.abs(scale - 14 / pixels) < 1e-5, `${scale}`);
+  await guide.getByRole("button", { name: "Begin" }).click();
+  const words = await until(
+    () => guide.getByLabel("Said", { exact: true }).textContent(),
+    (text) => text.includes("scale: "),
+    20_000,
+  );
+  const [, found, ...points] =
+    /scale: ([\d.]+) mm per pixel, from a ruler, 14 mm from (\d+), (\d+) to (\d+), (\d+)/.exec(words);
+  assert.ok(Math.abs(Number(found) - scale) < 1e-5, words);
+  [160, 180, 400, 420].forEach((wanted, i) => assert.ok(Math.abs(points[i] - wanted) <= 2, words));
+  await guide.getByRole("button", { name: "end the session" }).click();
+  await guide.getByRole("button", { name: "Close" }).click();
+  await pane.getByRole("radio", { name: "Depth" }).click();
+});
+
 test("what cannot be is refused in words", async () => {
   assert.match(await lastWord(view.page, "nonsense"), /GuidedStart in JSON/);
   assert.equal(await lastWord(view.page, "x".repeat(5000)), "");
@@ -117,8 +166,15 @@ test("one that may only look may not calibrate", async () => {
   ]);
   const viewer = await open(gateway);
   try {
-    // Without a token there is no WebSocket (401), and a page is not told why.
+    // Without a token there is no WebSocket; a page is not told why, only the browser is.
+    const refused = [];
+    viewer.page.on("websocket", (socket) => socket.on("socketerror", (why) => refused.push(why)));
     assert.equal(await lastWord(viewer.page, JSON.stringify(START)), "");
+    await until(
+      () => refused.join(),
+      (reasons) => /401|Authentication failed/.test(reasons),
+      10_000,
+    );
     assert.match(
       await lastWord(viewer.page, JSON.stringify(START), token),
       /may not calibrate: connect with a token that allows calibrate/,

@@ -73,6 +73,12 @@ async function pausedAt(deepestMm) {
   return pausedWith(pane, tap, async () => near(await numberOf(pane, "deepest")));
 }
 
+/** The calibration assumes the camera 30 mm above the middle of the map. */
+const CAMERA_MM = 30;
+
+/** Where a point along one axis is that is seen at `mm` and pressed in by `um`. */
+const placeOf = (mm, um) => mm * (1 - um / 1000 / CAMERA_MM);
+
 /** What is pressed deeper than half a millimetre by the canvas' colours: where and how deep. */
 function pressed(picture, mmPerPx) {
   let [sum, x, y, deepest] = [0, 0, 0, 0];
@@ -81,8 +87,8 @@ function pressed(picture, mmPerPx) {
       const mm = depthOf(picture, row, column);
       if (mm === undefined || mm < 0.5) continue;
       sum += mm;
-      x += mm * (column - (picture.width - 1) / 2) * mmPerPx;
-      y += mm * (row - (picture.height - 1) / 2) * mmPerPx;
+      x += mm * placeOf((column - (picture.width - 1) / 2) * mmPerPx, 1000 * mm);
+      y += mm * placeOf((row - (picture.height - 1) / 2) * mmPerPx, 1000 * mm);
       deepest = Math.max(deepest, mm);
     }
   }
@@ -160,8 +166,9 @@ test("the cursor tells the frame's value, by mouse and by keyboard", async () =>
   assert.equal(mouse.row, Math.floor(0.379 * MAP.height));
   assert.equal(mouse.um, frame.um(mouse.row, mouse.column));
   assert.ok(mouse.um > 500);
-  assert.equal(mouse.x, Number(((mouse.column - 249.5) * frame.mmPerPx).toFixed(2)));
-  assert.equal(mouse.y, Number(((mouse.row - 199.5) * frame.mmPerPx).toFixed(2)));
+  const placed = (mm) => Number(placeOf(mm, mouse.um).toFixed(2));
+  assert.equal(mouse.x, placed((mouse.column - 249.5) * frame.mmPerPx));
+  assert.equal(mouse.y, placed((mouse.row - 199.5) * frame.mmPerPx));
   await marks.focus();
   await view.page.keyboard.press("ArrowRight");
   await view.page.keyboard.press("Shift+ArrowDown");
@@ -207,7 +214,10 @@ test("a line tells its length and the difference of its ends", async () => {
   await view.page.mouse.up();
   const text = (await pane.locator("output.readout").textContent()).replaceAll("−", "-");
   const [, long, step] = /A–B ([\d.]+) mm, B - A (-?\d+) µm/.exec(text) ?? [];
-  assert.equal(Number(long), Number((162 * frame.mmPerPx).toFixed(2)));
+  const end = (column) =>
+    [column - 249.5, 151 - 199.5].map((px) => placeOf(px * frame.mmPerPx, frame.um(151, column)));
+  const [a, b] = [end(160), end(322)];
+  assert.equal(Number(long), Number(Math.hypot(b[0] - a[0], b[1] - a[1]).toFixed(2)));
   assert.equal(Number(step), frame.um(151, 322) - frame.um(151, 160));
   assert.ok(await pane.locator("figure.profile").isVisible());
   await pane.getByRole("radio", { name: "Point" }).click();
@@ -302,6 +312,34 @@ test("the camera's picture and its grey values", async () => {
     /^grey \d+ of 255 · row \d+, column \d+$/,
   );
   await pane.getByRole("radio", { name: "Depth" }).click();
+});
+
+test("the difference from the reference shows what darkened", async () => {
+  await view.page.keyboard.press("4");
+  const canvas = pane.locator("canvas.map");
+  // In a corner nothing happens; where something presses it gets darker than the reference.
+  const levels = () =>
+    canvas.evaluate((map) => {
+      const copy = new OffscreenCanvas(map.width, map.height).getContext("2d");
+      copy.drawImage(map, 0, 0);
+      const { data } = copy.getImageData(0, 0, map.width, map.height);
+      const red = data.filter((_, i) => i % 4 === 0);
+      let corner = 0;
+      for (let i = 0; i < 400; ++i) corner += red[(i % 20) + map.width * Math.floor(i / 20)] / 400;
+      return { width: map.width, corner, darkest: red.reduce((a, b) => Math.min(a, b), 255) };
+    });
+  await until(
+    levels,
+    ({ width, corner, darkest }) => width === 800 && Math.abs(corner - 128) < 8 && darkest < 64,
+    30_000,
+  );
+  const box = await pane.locator("canvas.marks").boundingBox();
+  await view.page.mouse.move(box.x + 0.02 * box.width, box.y + 0.02 * box.height);
+  const [, grey, before] = /^grey (\d+) of 255 · reference (\d+) · row/.exec(
+    await pane.locator("output.readout").textContent(),
+  );
+  assert.ok(Math.abs(grey - before) <= 6, `${grey} ${before}`);
+  await view.page.keyboard.press("1");
 });
 
 test("a place on the map is none on the camera's picture", async () => {
@@ -466,6 +504,12 @@ test("sensors, range and panels are as they were after a reload", async () => {
   await pane.getByLabel("Range to, mm").fill("0.8");
   await pane.getByLabel("Range to, mm").press("Enter");
   await pane.getByLabel("Speed and accuracy").locator("summary").click();
+  // The browser tells the page of the open panel in a task of its own.
+  await until(
+    () => view.page.evaluate(() => localStorage.getItem("dtact speed and accuracy")),
+    (open) => open === "true",
+    10_000,
+  );
   await view.page.reload();
   await until(
     () => pane.getAttribute("data-sequence"),
@@ -521,40 +565,49 @@ test("behind a proxy's path it shows depth", async () => {
   }
 });
 
+/** Where these parts of the pane lie, all at the same moment: a line of advice may come between two looks. */
+function boxesOf(parts) {
+  return pane.evaluate(
+    (root, selectors) => selectors.map((one) => root.querySelector(one).getBoundingClientRect().toJSON()),
+    parts,
+  );
+}
+
 test("on a phone everything is below each other and nothing is cut off", async () => {
   await view.page.setViewportSize(PHONE);
-  await until(
-    () => view.page.evaluate(() => document.documentElement.scrollWidth),
-    (width) => width <= 390,
-    5000,
-  );
-  const boxes = await Promise.all(
-    [
+  try {
+    await until(
+      () => view.page.evaluate(() => document.documentElement.scrollWidth),
+      (width) => width <= 390,
+      5000,
+    );
+    const [picture, ...boxes] = await boxesOf([
+      ".picture",
       ".stage",
       '[aria-label="Contact"]',
       '[aria-label="Quality"]',
       '[aria-label="Light"]',
       ".plots",
-    ].map((part) => pane.locator(part).first().boundingBox()),
-  );
-  for (let i = 1; i < boxes.length; ++i) {
+    ]);
+    for (let i = 1; i < boxes.length; ++i) {
+      assert.ok(
+        boxes[i].y >= boxes[i - 1].y + boxes[i - 1].height,
+        `part ${i} begins below the one before`,
+      );
+      assert.ok(boxes[i].x >= 0 && boxes[i].x + boxes[i].width <= 390);
+    }
     assert.ok(
-      boxes[i].y >= boxes[i - 1].y + boxes[i - 1].height,
-      `part ${i} begins below the one before`,
+      Math.abs(picture.width / picture.height - MAP.width / MAP.height) < 0.01,
+      `a map of ${picture.width} x ${picture.height}`,
     );
-    assert.ok(boxes[i].x >= 0 && boxes[i].x + boxes[i].width <= 390);
+    await until(
+      () => numberOf(pane, "deepest"),
+      (mm) => mm > 0.9,
+    );
+    await view.page.screenshot({ path: path.join(work, "phone.png"), fullPage: true });
+  } finally {
+    await view.page.setViewportSize({ width: 1440, height: 900 });
   }
-  const picture = await pane.locator(".picture").boundingBox();
-  assert.ok(
-    Math.abs(picture.width / picture.height - MAP.width / MAP.height) < 0.01,
-    `a map of ${picture.width} x ${picture.height}`,
-  );
-  await until(
-    () => numberOf(pane, "deepest"),
-    (mm) => mm > 0.9,
-  );
-  await view.page.screenshot({ path: path.join(work, "phone.png"), fullPage: true });
-  await view.page.setViewportSize({ width: 1440, height: 900 });
 });
 
 test("axe-core finds nothing, in either theme", async () => {
@@ -570,9 +623,9 @@ test("on a desktop picture, numbers and plots are seen at once", async () => {
     () => numberOf(pane, "deepest"),
     (mm) => mm > 0.9,
   );
-  for (const part of [".stage", '[aria-label="Contact"]', '[aria-label="Light"]', ".plots"]) {
-    const box = await pane.locator(part).first().boundingBox();
-    assert.ok(box.y >= 0 && box.y + box.height <= 900, `${part} ends at ${box.y + box.height}`);
+  const parts = [".stage", '[aria-label="Contact"]', '[aria-label="Light"]', ".plots"];
+  for (const [i, box] of (await boxesOf(parts)).entries()) {
+    assert.ok(box.y >= 0 && box.y + box.height <= 900, `${parts[i]} ends at ${box.y + box.height}`);
   }
   await view.page.screenshot({ path: path.join(work, "desktop.png") });
 });

@@ -2,7 +2,7 @@
 // CALIBRATE and SIM_RENDER name them; FOLDER is for their output. PAGE_DIST may name a folder with a page
 // to test in place of the one built into the gateway.
 import { execFileSync, spawn } from "node:child_process";
-import { existsSync, mkdirSync, mkdtempSync, rmSync, statSync, writeFileSync } from "node:fs";
+import { existsSync, mkdirSync, mkdtempSync, readFileSync, rmSync, statSync, writeFileSync } from "node:fs";
 import http from "node:http";
 import path from "node:path";
 import { fileURLToPath } from "node:url";
@@ -62,7 +62,7 @@ class Program {
   }
 
   async listening() {
-    for (let tries = 0; tries < 200; ++tries) {
+    for (let tries = 0; tries < 600; ++tries) {
       const port = /listening on (?:https?:\/\/)?127\.0\.0\.1:(\d+)/.exec(this.output)?.[1];
       if (port) return Number(port);
       if (this.child.exitCode !== null) break;
@@ -159,8 +159,8 @@ export async function startProxy(gateway) {
 }
 
 /** dtact-perceive beside a daemon of this machine. It listens on any free port unless told which. */
-export async function startPerceive(port, listenPort = 0) {
-  const words = ["--port", String(port), "serve", "--listen-port", String(listenPort)];
+export async function startPerceive(port, listenPort = 0, more = []) {
+  const words = ["--port", String(port), "serve", "--listen-port", String(listenPort), ...more];
   const perceive = new Program(DTACT_PERCEIVE, words);
   perceive.port = await perceive.listening();
   return perceive;
@@ -171,10 +171,10 @@ export function status(daemon) {
   return JSON.parse(execFileSync(DTACTCTL, words, { encoding: "utf8" }));
 }
 
-/** A token of these rights and the file that lets it in. */
+/** A token of these rights and the file that admits it. */
 export function tokenFile(rights) {
-  const line = execFileSync(DTACTCTL, ["token", "--new", rights], { encoding: "utf8" }).trim();
   const file = path.join(work, `tokens-${rights}`);
-  writeFileSync(file, `${line}\n`, { mode: 0o600 });
-  return { file, token: line.split(" ")[1] };
+  const words = ["token", "--new", rights, "-o", `${file}.client`];
+  writeFileSync(file, execFileSync(DTACTCTL, words, { encoding: "utf8" }), { mode: 0o600 });
+  return { file, token: readFileSync(`${file}.client`, "utf8").trim() };
 }

@@ -2,7 +2,7 @@
 // of the daemon.
 import assert from "node:assert/strict";
 import { execFileSync } from "node:child_process";
-import { readFileSync } from "node:fs";
+import { readFileSync, writeFileSync } from "node:fs";
 import { createRequire } from "node:module";
 import path from "node:path";
 import { after, before, test } from "node:test";
@@ -35,7 +35,7 @@ after(async () => {
 });
 
 // A package that the page is built with.
-const { McapStreamReader } = createRequire(path.resolve(process.env.FOLDER, "page/package.json"))(
+const { McapStreamReader, McapWriter } = createRequire(path.resolve(process.env.FOLDER, "page/package.json"))(
   "@mcap/core",
 );
 
@@ -152,6 +152,132 @@ test("depth can be made anew from it", async () => {
   const maps = (frames) => frames.filter(({ map }) => map !== "").length;
   assert.ok(maps(recorded) > 0, "no depth was recorded");
   assert.equal(maps(remade), maps(recorded));
+});
+
+/** Opens a file in the page. The pane that plays it. */
+async function play(file) {
+  await view.page.getByLabel("Recording", { exact: true }).setInputFiles(file);
+  const player = view.page.locator(`[data-recording="${path.basename(file)}"]`);
+  await player.waitFor();
+  return player;
+}
+
+const close = (player) => player.getByRole("button", { name: "Close" }).click();
+
+for (const [by, make] of [
+  ["this page", () => record(() => pane.getByRole("button", { name: "Stop" }).click())],
+  [
+    "dtactctl",
+    () => {
+      const file = path.join(work, "ctl.mcap");
+      ctl("--port", String(daemon.port), "record", "--seconds", "4", "-o", file);
+      return file;
+    },
+  ],
+]) {
+  test(`a recording of ${by} plays, and any moment of it is shown`, async () => {
+    const file = await make();
+    const frames = framesOf(file);
+    const player = await play(file);
+    await until(
+      () => player.getAttribute("data-sequence"),
+      (sequence) => sequence !== null,
+    );
+    await until(
+      () => player.getByRole("button", { name: "Resume" }).count(),
+      (count) => count === 1,
+    );
+    const [at, length] = (await fact(player, "played").textContent()).split(" of ");
+    assert.equal(at, length);
+    await until(
+      () => player.getAttribute("data-sequence"),
+      (sequence) => Number(sequence) === frames.at(-1).sequence,
+    );
+    // A frame with a map, some way into the recording, by its number.
+    const slider = player.getByLabel("Time in the recording");
+    const seconds = Number(await slider.getAttribute("max"));
+    await slider.evaluate((input, value) => {
+      input.value = String(value);
+      input.dispatchEvent(new Event("input"));
+    }, seconds / 3);
+    await until(
+      () => player.getAttribute("data-sequence"),
+      (sequence) => Number(sequence) < frames.at(-1).sequence,
+    );
+    const sought = Number(await player.getAttribute("data-sequence"));
+    const frame = frames.find(({ sequence }) => sequence === sought);
+    await player.locator("canvas.marks").hover();
+    const [, um, row, column] = /^(−?\d+) µm · row (\d+), column (\d+)/.exec(
+      await player.locator(".readout").textContent(),
+    );
+    const mm = frame.mm(Number(row), Number(column));
+    assert.ok(Math.abs(1000 * mm - Number(um.replace("−", "-"))) <= 0.51, `${mm} mm, ${um} µm`);
+    await player.getByRole("button", { name: "One frame back" }).click();
+    await until(
+      () => player.getAttribute("data-sequence"),
+      (sequence) => Number(sequence) === frames[frames.indexOf(frame) - 1].sequence,
+    );
+    await player.getByRole("radio", { name: "Camera" }).click();
+    await until(
+      () => player.locator(".veil p").textContent(),
+      (text) => text === "",
+    );
+    await player.getByRole("button", { name: "Resume" }).click();
+    await until(
+      () => player.getAttribute("data-sequence"),
+      (sequence) => Number(sequence) > frame.sequence,
+    );
+    await close(player);
+    assert.equal(await player.count(), 0);
+  });
+}
+
+test("of a damaged recording the rest plays; what is none says what is wrong", async () => {
+  const whole = readFileSync(path.join(work, "ctl.mcap"));
+  const written = (name, bytes) => {
+    const file = path.join(work, name);
+    writeFileSync(file, bytes);
+    return file;
+  };
+  const damaged = Buffer.from(whole);
+  const middle = whole.length >> 1;
+  damaged.fill(0x5a, middle, middle + 40);
+  const player = await play(written("damaged.mcap", damaged));
+  await until(
+    () => player.locator(".timeline .trouble").textContent(),
+    (text) => /^Not readable, part of the file: 1 \(/.test(text),
+  );
+  await until(
+    () => player.getByRole("button", { name: "Resume" }).count(),
+    (count) => count === 1,
+  );
+  await close(player);
+  const parts = [];
+  const foreign = new McapWriter({
+    writable: {
+      write: async (part) => void parts.push(Buffer.from(part)),
+      position: () => BigInt(Buffer.concat(parts).length),
+    },
+  });
+  await foreign.start({ profile: "", library: "another" });
+  const messageEncoding = "json";
+  const channelId = await foreign.registerChannel({ schemaId: 0, topic: "/x", messageEncoding, metadata: new Map() });
+  await foreign.addMessage({ channelId, sequence: 0, logTime: 1n, publishTime: 1n, data: Buffer.from("{}") });
+  await foreign.end();
+  const cases = {
+    "text.mcap": [Buffer.from("no recording, but longer than the head of one"), /cannot be played/],
+    "empty.mcap": [Buffer.alloc(0), /cannot be played: it ends too early/],
+    "cut.mcap": [whole.subarray(0, whole.length * 0.7), /cannot be played: .*mcap recover/],
+    "foreign.mcap": [Buffer.concat(parts), /it has no frames of dtactd, only \/x/],
+  };
+  for (const [name, [bytes, sentence]] of Object.entries(cases)) {
+    const player = await play(written(name, bytes));
+    await until(
+      () => player.locator(".notice").first().textContent(),
+      (text) => sentence.test(text),
+    );
+    await close(player);
+  }
 });
 
 test("a closed pane downloads its recording", async () => {

@@ -52,13 +52,14 @@ def prepare(programs, folder):
 
 
 class Daemon:
-    """A running dtactd on the replay backend. `settings` override the configuration."""
+    """A running dtactd on the replay backend. `settings` override the configuration; `log` is a name
+    in `folder`."""
 
-    def __init__(self, programs, folder, settings, prefix=()):
+    def __init__(self, programs, folder, settings, prefix=(), log="dtactd.log"):
         self.programs = programs
         self.folder = folder
         self.prefix = list(prefix)
-        self.log_name = os.path.join(folder, "dtactd.log")
+        self.log_name = os.path.join(folder, log)
         self.settings = {
             "camera.backend": "replay", "ring.backend": "null", "camera.fps": float(FPS),
             "net.port": 0, "net.max_clients": 128, "net.max_clients_per_address": 128,

@@ -98,7 +98,7 @@ struct Times {
   }
 };
 
-/// Compares every point with the surface point plus its normal, to a tenth of a micrometre.
+/// Compares every point with the surface point moved along its ray, to a tenth of a micrometre.
 void verify(const Sensor& sensor, const Part& part, const PointCloud& cloud) {
   for (int row = 0; row < cloud.height; ++row) {
     for (int column = 0; column < cloud.width; ++column) {
@@ -107,7 +107,7 @@ void verify(const Sensor& sensor, const Part& part, const PointCloud& cloud) {
           sensor
               .pixels[static_cast<std::size_t>((part.grid.y + row) * kSide + part.grid.x + column)];
       const Vector3d there =
-          Vector3d(pixel.point.data()) - 1e-6 * part.values[i] * Vector3d(pixel.normal.data());
+          Vector3d(pixel.point.data()) - 1e-6 * part.values[i] * Vector3d(pixel.ray.data());
       const Vector3d point(cloud.part(PointCloud::kX)[i], cloud.part(PointCloud::kY)[i],
                            cloud.part(PointCloud::kZ)[i]);
       const Vector3d normal(cloud.part(PointCloud::kNormalX)[i],

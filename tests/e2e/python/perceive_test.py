@@ -40,7 +40,7 @@ class Perceive(unittest.TestCase):
                 if f.has_cloud and f.pose and f.pose.tracking == "tracked" and f.contact.deepest_mm > 0.3:
                     break
         self.assertFalse(f.has_depth)
-        self.assertEqual(f.surface, dtact.Surface("plane"))
+        self.assertEqual(f.surface, dtact.Surface("plane", per_mm=1 / 30))  # what is assumed without a board
         cloud = f.cloud
         points = cloud.points[cloud.valid]
         # Pressed in is below the undeformed surface, metres; the deepest is at the summary's position.
@@ -73,6 +73,41 @@ class Perceive(unittest.TestCase):
         np.testing.assert_array_equal(made.valid, cloud.valid)
         np.testing.assert_allclose(made.points, cloud.points, atol=1e-8)
         np.testing.assert_allclose(made.normals, cloud.normals, atol=1e-5)
+
+    def test_what_the_object_is(self):
+        with dtact.connect(self.address) as s:
+            s.subscribe(dtact.Subscription(depth=None, recognition=True))
+            until = time.monotonic() + 60
+            for f in s.frames():
+                self.assertLess(time.monotonic(), until, "nothing was recognised within a minute")
+                if f.recognition and f.recognition.presses == 1:
+                    break
+        self.assertEqual(len(f.recognition.candidates), 5)
+        self.assertFalse(f.recognition.candidates[0].taught)
+        self.assertEqual(len(f.recognition.model), 64)
+
+    def test_teaching_an_object(self):
+        folder = self.daemon.folder / "taught"
+
+        def objects(*arguments):
+            return subprocess.run([os.environ["CALIBRATE"], "--host", self.daemon.address, "objects",
+                                   *arguments, "--taught", folder],
+                                  check=True, capture_output=True, text=True, timeout=120).stdout
+
+        folder.mkdir()
+        (folder / "torn.png").write_bytes(b"")
+        said = objects("teach", "thing", "--presses", "3")
+        self.assertIn("warning: ", said)
+        self.assertIn("torn.png: not a readable PNG", said)
+        self.assertIn("press 3 of 3 taken", said)
+        objects("forget", "torn")
+        self.assertEqual(objects("list"), "thing: 3 presses\n")
+        objects("rename", "thing", "other")
+        self.assertEqual(objects("list"), "other: 3 presses\n")
+        with self.assertRaises(subprocess.CalledProcessError):
+            objects("forget", "thing")
+        objects("forget", "other")
+        self.assertEqual(objects("list"), "")
 
     def test_a_recording_holds_points_and_poses(self):
         file = self.daemon.folder / "points.mcap"

@@ -5,7 +5,6 @@ import base64
 import hashlib
 import json
 import pathlib
-import shutil
 import struct
 import subprocess
 import sys
@@ -16,7 +15,7 @@ import unittest
 from socket import create_server
 from typing import Any
 
-from programs import Daemon, Gateway, Perceive, calibrate
+from programs import Daemon, Gateway, Perceive, calibrate, install_npm_packages, write_tokens
 from viewer import Client, E, M
 from web_socket import Closed, Refused, WebSocket, request
 
@@ -33,32 +32,10 @@ TOPICS = {"/dtact/frame": "dtact.v1.Frame", "/dtact/summary": "dtact.v1.Frame",
           "/camera/luma": "foxglove.RawImage", "/camera/jpeg": "foxglove.CompressedImage"}
 POINTS = {"/dtact/summary": "dtact.v1.Frame", "/dtact/contact": "dtact.v1.Contact",
           "/dtact/points": "foxglove.PointCloud", "/dtact/pose": "foxglove.PoseInFrame",
-          "/tf": "foxglove.FrameTransforms"}
+          "/dtact/recognition": "dtact.v1.Recognition", "/tf": "foxglove.FrameTransforms"}
 daemon: Daemon
 perceive: Perceive
 gateway: Gateway
-
-
-def skip(why: str) -> None:
-    print("skipped:", why)
-    sys.exit(77)
-
-
-def install() -> None:
-    for tool in ("node", "npm"):
-        if shutil.which(tool) is None:
-            skip(f"{tool} is not installed")
-    NODE.mkdir(parents=True, exist_ok=True)
-    package, there = HERE / "package.json", NODE / "package.json"
-    if (NODE / "installed").exists() and there.read_text() == package.read_text():
-        return
-    shutil.copy(package, there)
-    done = subprocess.run(["npm", "install", "--no-audit", "--no-fund", "--no-package-lock",
-                           "--ignore-scripts", "--fetch-retries=0", "--fetch-timeout=30000"],
-                          cwd=NODE, capture_output=True, text=True, check=False)
-    if done.returncode != 0:
-        skip(f"npm cannot install @foxglove/ws-protocol: {done.stderr.strip()[-200:]}")
-    (NODE / "installed").touch()
 
 
 def setUpModule() -> None:
@@ -301,8 +278,7 @@ class Protocol(unittest.TestCase):
 
     def test_tokens(self) -> None:
         tokens = pathlib.Path(FOLDER.name, "tokens")
-        tokens.write_text("view a-token-to-look-on\ncontrol a-token-to-command\n")
-        tokens.chmod(0o600)
+        write_tokens(tokens, "view a-token-to-look-on", "control a-token-to-command")
         gate = Gateway(pathlib.Path(FOLDER.name), "--host", f"127.0.0.1:{daemon.port}", "--tokens", str(tokens))
         while not json.loads(request(gate.port, "/sensors")[2])[0]["connected"]:
             time.sleep(0.1)
@@ -346,5 +322,7 @@ class Protocol(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    install()
+    if why := install_npm_packages(NODE):
+        print("skipped:", why)
+        sys.exit(77)
     unittest.main(verbosity=2)

@@ -11,7 +11,7 @@ import tempfile
 import time
 import unittest
 
-from programs import Daemon, Gateway, calibrate
+from programs import Daemon, Gateway, calibrate, write_tokens
 from viewer import Client, E, M, Viewer, length
 from web_socket import BINARY, TIMEOUT, TEXT, Closed, Refused, WebSocket, connect, request
 
@@ -27,6 +27,8 @@ gateway: Gateway
 
 def setUpModule() -> None:
     global left, right, gateway
+    # dtact-web starts it.
+    os.environ["PATH"] = f"{os.path.dirname(os.environ['CALIBRATE'])}:{os.environ['PATH']}"
     (HERE / "page").mkdir()
     (HERE / "page/index.html").write_text("<!doctype html><title>The page</title>")
     (HERE / "page/a.js").write_text("export const a = 1;\n")
@@ -162,8 +164,7 @@ class Rights(unittest.TestCase):
     @classmethod
     def setUpClass(cls) -> None:
         tokens = HERE / "tokens"
-        tokens.write_text(f"view {VIEW} eyes\ncontrol {CONTROL} hands\ncalibrate {CALIBRATE} bench\n")
-        tokens.chmod(0o600)
+        write_tokens(tokens, f"view {VIEW} eyes", f"control {CONTROL} hands", f"calibrate {CALIBRATE} bench")
         cls.gate = Gateway(HERE, "--daemon", f"left=127.0.0.1:{left.port}", "--daemon",
                            "gone=127.0.0.1:1", "--tokens", str(tokens))
 
@@ -198,6 +199,13 @@ class Rights(unittest.TestCase):
             viewer.notice(lambda reported: reported["connected"])
             viewer.call(activate_calibration=M.ActivateCalibration(number=0))
 
+    def test_the_fleet_needs_a_token(self) -> None:
+        self.assertEqual(request(self.gate.port, "/fleet")[0], 401)
+        status, _, body = request(self.gate.port, f"/fleet?token={VIEW}")
+        self.assertEqual(status, 200)
+        gone = json.loads(body)[1]
+        self.assertEqual((gone["name"], gone["connected"], "status" in gone), ("gone", False, False))
+
     def test_a_guided_calibration_needs_them(self) -> None:
         for token, expected in ((CONTROL, "may not calibrate"), (CALIBRATE, "GuidedStart")):
             with WebSocket(self.gate.port, f"/sensors/left/calibrate?token={token}") as page:
@@ -206,13 +214,12 @@ class Rights(unittest.TestCase):
 
     def test_a_reload_ends_whose_token_is_gone(self) -> None:
         tokens = HERE / "tokens-to-revoke"
-        tokens.write_text(f"view {VIEW}\ncontrol {CONTROL} hands\n")
-        tokens.chmod(0o600)
+        write_tokens(tokens, f"view {VIEW}", f"control {CONTROL} hands")
         gate = Gateway(HERE, "--daemon", f"left=127.0.0.1:{left.port}", "--tokens", str(tokens))
         protocol = "foxglove.sdk.v1"
         with Viewer(gate.port, token=VIEW) as stays, Viewer(gate.port, token=CONTROL) as goes, \
                 WebSocket(gate.port, f"/foxglove?token={CONTROL}", Sec_WebSocket_Protocol=protocol) as foxglove:
-            tokens.write_text(f"view {VIEW}\n")
+            write_tokens(tokens, f"view {VIEW}")
             assert gate.process is not None
             gate.process.send_signal(signal.SIGHUP)
             error = goes.answer(0).error
@@ -283,11 +290,40 @@ class Rights(unittest.TestCase):
             if number % 40 == 39:
                 answered += request(self.gate.port, "/sensors")[0] == 200
         self.assertEqual(answered, 10)
-        assert self.gate.process is not None
-        descriptors = len(list(pathlib.Path(f"/proc/{self.gate.process.pid}/fd").iterdir()))
-        self.assertLess(descriptors, 64 + 60, "of one address 64 may wait")
+        self.assertLess(self.gate.descriptors(), 64 + 60, "of one address 64 may wait")
         for stream in held:
             stream.close()
+
+    def test_few_programs_run_for_pages_at_once(self) -> None:
+        """Before: one for each of 48 pages that asked for the taught objects."""
+        pages = [WebSocket(gateway.port, "/sensors/left/calibrate") for _ in range(12)]
+        for page in pages:
+            page.send(b'{"objects":{}}', TEXT)
+        refused = served = 0
+        for page in pages:
+            ended = ""
+            while not ended:
+                ended = page.receive()[1].decode()
+                ended = ended if '"ended"' in ended else ""
+            refused += "ask again in a moment" in ended
+            served += '"error":""' in ended or '"ended":{}' in ended
+            page.stream.close()
+        self.assertGreaterEqual(served, 4)
+        self.assertGreaterEqual(refused, 1)
+        self.assertEqual(served + refused, 12)
+
+    def test_web_sockets_without_hello_are_bounded_over_all_sensors(self) -> None:
+        """Before: 64 for each sensor, so that a fleet's gateway ran out of descriptors."""
+        names = [f"s{number}" for number in range(4)]
+        gate = Gateway(HERE, *(word for name in names for word in ("--daemon", f"{name}=127.0.0.1:1")))
+        rest = gate.descriptors()
+        held = [WebSocket(gate.port, f"/sensors/{names[number % 4]}/wire") for number in range(120)]
+        self.assertLessEqual(gate.descriptors(), rest + 64 + 8)
+        with Viewer(gate.port, names[0]):
+            self.assertEqual(request(gate.port, "/sensors")[0], 200)
+        for one in held:
+            one.stream.close()
+        self.assertEqual(gate.stop(), 0)
 
     def test_no_token_and_a_wrong_one(self) -> None:
         for token in ("", "a-token-that-is-not-known"):
@@ -305,10 +341,9 @@ class Rights(unittest.TestCase):
 
     def test_rights_are_no_more_than_the_gateways_own(self) -> None:
         tokens, token = HERE / "daemon-tokens", HERE / "gateway-token"
-        tokens.write_text(f"view {VIEW}\n")
+        write_tokens(tokens, f"view {VIEW}")
         token.write_text(VIEW)
-        for file in (tokens, token):
-            file.chmod(0o600)
+        token.chmod(0o600)
         daemon = Daemon(HERE, "guarded", f"net.tokens={tokens}")
         gate = Gateway(HERE, "--daemon", f"left=127.0.0.1:{daemon.port},token-file={token}")
         with Viewer(gate.port) as viewer:
@@ -368,6 +403,20 @@ class Http(unittest.TestCase):
                                             {"name": "right", "connected": True}])
         self.assertEqual((fields["content-type"], fields["cache-control"]),
                          ("application/json", "no-store"))
+
+    def test_fleet(self) -> None:
+        until = time.monotonic() + 20
+        while True:  # the first answer comes before the daemons'
+            _, fields, body = request(gateway.port, "/fleet")
+            entries = json.loads(body)
+            if all("status" in one for one in entries) or time.monotonic() > until:
+                break
+            time.sleep(0.1)
+        self.assertEqual(fields["content-type"], "application/json")
+        self.assertEqual([one["name"] for one in entries], ["left", "right"])
+        for one in entries:
+            self.assertEqual(set(one["status"]), {"state", "fps", "version", "health", "advice"})
+            self.assertRegex(one["status"]["version"], r"^\d+\.\d+\.\d+")
 
     def test_nothing_else(self) -> None:
         for target in ("/../../etc/passwd", "/..%2f..%2fetc/passwd", "/%2e%2e/page", "//etc/passwd",

@@ -1,8 +1,10 @@
 """The programs under test, named by the environment: DTACTD, DTACT_WEB, DTACT_PERCEIVE, DTACTCTL,
 CALIBRATE, SIM_RENDER."""
+import hashlib
 import os
 import pathlib
 import re
+import shutil
 import signal
 import subprocess
 import time
@@ -26,6 +28,25 @@ keys = [
 """
 
 
+def install_npm_packages(folder: pathlib.Path) -> str:
+    """Installs those of package.json in this folder into another one. Returns why it cannot; '' when it could."""
+    for tool in ("node", "npm"):
+        if shutil.which(tool) is None:
+            return f"{tool} is not installed"
+    folder.mkdir(parents=True, exist_ok=True)
+    package, there = pathlib.Path(__file__).parent / "package.json", folder / "package.json"
+    if (folder / "installed").exists() and there.read_text() == package.read_text():
+        return ""
+    shutil.copy(package, there)
+    done = subprocess.run(["npm", "install", "--no-audit", "--no-fund", "--no-package-lock", "--ignore-scripts",
+                           "--fetch-retries=0", "--fetch-timeout=30000"],
+                          cwd=folder, capture_output=True, text=True, check=False)
+    if done.returncode != 0:
+        return f"npm cannot install: {done.stderr.strip()[-200:]}"
+    (folder / "installed").touch()
+    return ""
+
+
 def calibrate(folder: pathlib.Path) -> pathlib.Path:
     """The map's sides are no multiples of four and not equal, so that remainders and swapped axes
     show."""
@@ -38,6 +59,14 @@ def calibrate(folder: pathlib.Path) -> pathlib.Path:
                     "400,300", "--crop", "570,582", "-o", folder / "calibration"], check=True,
                    stdout=subprocess.DEVNULL)
     return folder / "calibration"
+
+
+def write_tokens(file: pathlib.Path, *lines: str) -> None:
+    """Lines as "view TOKEN NAME"; the file has the tokens' hashes."""
+    words = [line.split() for line in lines]
+    file.write_text("".join(f"{rights} sha256:{hashlib.sha256(token.encode()).hexdigest()} {' '.join(name)}\n"
+                            for rights, token, *name in words))
+    file.chmod(0o600)
 
 
 class Program:
@@ -71,14 +100,16 @@ class Program:
 class Daemon(Program):
     """A dtactd on the simulated sensor, in which a ball is pressed repeatedly."""
 
-    def __init__(self, folder: pathlib.Path, name: str, *settings: str, port: int = 0) -> None:
+    def __init__(self, folder: pathlib.Path, name: str, *settings: str, port: int = 0,
+                 within: tuple[str, ...] = ()) -> None:
+        """`within`: the command that runs it."""
         scene = folder / "scene.toml"
         scene.write_text(SCENE)
         # At normal priority, so that other programs on this machine keep their share.
         every = [f"net.port={port}", f"net.name={name}", f"state_dir={folder}/{name}-state",
                  f"camera.sim.scene={scene}", "capture.fifo_priority=0", "net.fifo_priority=0",
                  *settings]
-        super().__init__([os.environ["DTACTD"], *(word for one in every for word in ("--set", one))],
+        super().__init__([*within, os.environ["DTACTD"], *(word for one in every for word in ("--set", one))],
                          folder / f"{name}.log", r"listening on 127\.0\.0\.1:(\d+)")
 
     def restart(self) -> None:
@@ -103,3 +134,29 @@ class Gateway(Program):
         number = len(list(folder.glob("web-*.log")))
         super().__init__([os.environ["DTACT_WEB"], "--listen-port", "0", *arguments],
                          folder / f"web-{number}.log", r"listening on https?://[\d.]+:(\d+)/")
+        # Its memory when nobody has connected yet; sanitizers keep what is freed.
+        self.rest_kib = None if "san.so" in self.of_kernel("maps") else self.kib("VmRSS")
+
+    def of_kernel(self, what: str) -> str:
+        assert self.process is not None
+        return pathlib.Path(f"/proc/{self.process.pid}/{what}").read_text()
+
+    def kib(self, what: str) -> int:
+        found = re.search(rf"{what}:\s+(\d+)", self.of_kernel("status"))
+        assert found is not None
+        return int(found[1])
+
+    def descriptors(self) -> int:
+        assert self.process is not None
+        return len(list(pathlib.Path(f"/proc/{self.process.pid}/fd").iterdir()))
+
+    def stop(self, by: int = signal.SIGTERM) -> int:
+        """Checks before that it has given back what viewers took, whatever they did."""
+        if self.rest_kib is not None:
+            until = time.monotonic() + 20
+            while self.kib("VmRSS") > self.rest_kib + 8 * 1024 and time.monotonic() < until:
+                time.sleep(0.1)
+            now, peak = self.kib("VmRSS"), self.kib("VmHWM")
+            print(f"dtact-web: {self.rest_kib} KiB at rest, at most {peak}, {now} at the end")
+            assert now <= self.rest_kib + 8 * 1024 and peak <= 150 * 1024, self.text()
+        return super().stop(by)

@@ -5,10 +5,8 @@ store=/etc/credstore
 fingerprint=$(dtactctl cert -o /tmp/keys | sed -n 's/^--fingerprint //p')
 install -m 600 /tmp/keys/dtactd.crt $store/dtactd.tls-certificate
 install -m 600 /tmp/keys/dtactd.key $store/dtactd.tls-key
-dtactctl token --new view > /tmp/token-line
+dtactctl token --new view -o /tmp/token > /tmp/token-line
 install -m 600 /tmp/token-line $store/dtactd.tokens
-cut -d ' ' -f 2 /tmp/token-line > /tmp/token
-chmod 600 /tmp/token
 sed -i '/^\[net\]/,/^\[metrics\]/{
   s|^tls_certificate = ""|tls_certificate = "credential:tls-certificate"|
   s|^tls_key = ""|tls_key = "credential:tls-key"|
@@ -29,12 +27,11 @@ is_still "$before"
 runuser -u dtactd -- test -r $store/dtactd.tokens && fail "the daemon's user reads the tokens on disk"
 # A token that is revoked there may count until a restart (systemd 252 passes new ones with a reload,
 # later ones do not), and the reload reports that.
-dtactctl token --new view > /tmp/token-line
+dtactctl token --new view -o /tmp/new-token > /tmp/token-line
 install -m 600 /tmp/token-line $store/dtactd.tokens
 systemctl reload dtactd
 within 60 bash -c 'systemctl show -p StatusText dtactd | grep "new credentials need a restart: .*net.tokens"'
 systemctl restart dtactd
 dtactctl "${tls[@]}" --token-file /tmp/token status && fail "the revoked token is taken"
-cut -d ' ' -f 2 /tmp/token-line > /tmp/token
-within 120 dtactctl "${tls[@]}" --token-file /tmp/token status
-rm -r $store/dtactd.* /tmp/keys /tmp/token /tmp/token-line
+within 120 dtactctl "${tls[@]}" --token-file /tmp/new-token status
+rm -r $store/dtactd.* /tmp/keys /tmp/token /tmp/new-token /tmp/token-line

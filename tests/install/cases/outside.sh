@@ -18,8 +18,8 @@ printf '[Service]\nIPAddressAllow=192.168.7.0/24\n' > /etc/systemd/system/dtactd
 systemctl daemon-reload
 systemctl restart dtactd
 within 120 ip netns exec other dtactctl --host 192.168.7.1 status
-reported=$(ip netns exec other python3 /job/stream.py 192.168.7.1 60 600 2>&1) || fail "$told"
-say "$told"
+reported=$(ip netns exec other python3 /job/stream.py 192.168.7.1 60 600 2>&1) || fail "$reported"
+say "$reported"
 rm /etc/systemd/system/dtactd.service.d/network.conf
 cp /tmp/good.toml "$config"
 systemctl daemon-reload

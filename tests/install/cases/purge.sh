@@ -1,13 +1,14 @@
 # shellcheck shell=bash disable=SC2154
-# After a purge nothing of the packages is left: no file, no process, no unit; nor of a second sensor and of the page,
-# which run when they are removed. When they are installed again before that, enabled units return.
+# After a purge nothing of the packages is left: no file, no process, no unit; nor of a second sensor, of the page and
+# of dtact-dds, which run when they are removed. When they are installed again before that, enabled units return.
 instance left 7401
-systemctl enable -q --now dtact-web
+systemctl enable -q --now dtact-web dtact-dds
 within 120 bash -c 'ss -ltn | grep -q 127.0.0.1:7380'
-running() { pgrep -l -x dtactd || pgrep -l -x dtact-web; }
+within 120 bash -c 'journalctl --no-pager -o cat -b -u dtact-dds | grep -F "sensor is there: dtactd"'
+running() { pgrep -l -x dtactd || pgrep -l -x dtact-web || pgrep -l -x dtact-dds; }
 instance right 7402
 systemctl disable -q dtactd@right
-apt_get remove dtactd dtact-tools
+apt_get remove dtactd dtact-tools dtact-dds
 running && fail "it runs from programs that are gone"
 [ -e "$config" ] || fail "a removal took the configuration"
 apt_get -o Dpkg::Options::=--force-confold install /job/packages/dtact{d,-tools}_*.deb
@@ -18,7 +19,7 @@ running && fail "it runs from programs that are gone"
 # A folder that is a disc of its own is emptied, and the purge does not fail for its mount point.
 discs=(/var/lib/dtactd /var/lib/private/dtact-web)
 for disc in "${discs[@]}"; do mount --bind "$disc" "$disc"; done
-apt_get purge dtactd dtact-tools libdtact1 libdtact-dev python3-dtact
+apt_get purge dtactd dtact-dds dtact-tools libdtact1 libdtact-dev python3-dtact
 for disc in "${discs[@]}"; do
   [ -z "$(ls -A "$disc")" ] || fail "left: $(find "$disc")"
   umount "$disc"

@@ -1,13 +1,13 @@
 # shellcheck shell=bash disable=SC2154
 # A newer version over this one; both the administrator and the newer version changed the configuration. A
-# second sensor and the page are enabled beside it.
+# second sensor, the page and dtact-dds are enabled beside it.
 within 120 serving
 echo '# kept by the administrator' >> "$config"
 cp "$config" /tmp/edited.toml
 dtactctl calibration upload /job/calibrations/old --name kept
 instance left 7401
-systemctl enable -q --now dtact-web
-units=(dtactd dtactd@left dtact-web)
+systemctl enable -q --now dtact-web dtact-dds
+units=(dtactd dtactd@left dtact-web dtact-dds)
 program() { readlink "/proc/$(pid "$1")/exe"; }
 for unit in "${units[@]}"; do say "$unit: $(program "$unit")"; done
 apt_get -o Dpkg::Options::=--force-confdef -o Dpkg::Options::=--force-confold install /job/newer/*.deb
@@ -22,6 +22,6 @@ for unit in "${units[@]}"; do
 done
 # This unit was not enabled.
 [ "$(property ActiveState dtact-perceive)" = inactive ] || fail "dtact-perceive was started"
-systemctl disable -q --now dtactd@left dtact-web
+systemctl disable -q --now dtactd@left dtact-web dtact-dds
 rm /etc/dtactd/left.toml
 expect kept dtactctl calibration list

@@ -1,6 +1,7 @@
 // A LUT of one press with the zero of another LUT.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 

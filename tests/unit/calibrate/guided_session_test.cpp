@@ -33,6 +33,7 @@ class GuidedSession : public testing::Test {
     plan_.folder = fs::path(::mkdtemp(name.data())) / "ball";
     plan_.ball_radius_mm = 4;
     plan_.map.mm_per_px = 0.05;
+    plan_.map.camera_mm = 1000;  // the imagined sensor has parallel rays
     plan_.presses = 4;
     plan_.reference_frames = 8;
     plan_.press_frames = 4;

@@ -55,6 +55,26 @@ TEST_F(LensFileTest, IsRead) {
   EXPECT_FALSE(file.gain_specified);
 }
 
+TEST_F(LensFileTest, HoldsWhereTheCameraStands) {
+  LensFile file = load();
+  EXPECT_EQ(file.view, CameraView{}) << "a file without it says nothing";
+  for (const CameraView& view : {CameraView{{0.3, -0.2}, HeightSource::board, 0, 0.00112, 0.00004},
+                                 CameraView{{0.1, 0}, HeightSource::drawing, 0.04, 0, 0}}) {
+    file.view = view;
+    base::write_file_atomically(path(), format(file));
+    EXPECT_EQ(load_lens(path()).view, view);
+  }
+  const auto refused = [this](const std::string& from, const std::string& to) {
+    std::string text = base::read_file(path());
+    text.replace(text.find(from), from.size(), to);
+    base::write_file_atomically(path(), text);
+    (void)load_lens(path());
+  };
+  EXPECT_THAT(
+      [&] { refused("drawing", "guess"); },
+      ThrowsMessage<std::runtime_error>(AllOf(HasSubstr("lens.toml"), HasSubstr("source"))));
+}
+
 TEST_F(LensFileTest, IsReadBackExactly) {
   LensFile file = load();
   file.lens.homography[0] = 20.1;  // no binary fraction

@@ -52,7 +52,7 @@ std::set<std::string> options_of(Run run, std::vector<std::string> command) {
   EXPECT_EQ(run(command, out, error), 0);
   const std::string help = out.str();
   // Options begin a line of the help; others are only mentioned.
-  const std::regex option(R"(\n  (?:-\w,)?(--[a-z-]+))");
+  const std::regex option(R"(\n  (?:-\w,)?(--[a-z0-9-]+))");
   std::set<std::string> found;
   for (std::sregex_iterator match(help.begin(), help.end(), option), end; match != end; ++match) {
     found.insert((*match)[1]);
@@ -66,6 +66,7 @@ TEST(Completion, OffersCommands) {
   EXPECT_THAT(complete("dtactctl calibration \"\""),
               UnorderedElementsAre("upload", "list", "show", "activate", "download", "pin", "unpin",
                                    "--help"));
+  EXPECT_THAT(complete("dtactctl fleet --daemon left=gripper re"), UnorderedElementsAre("rezero"));
   EXPECT_THAT(complete("dtact-calibrate re"), UnorderedElementsAre("reprocess"));
 }
 
@@ -98,11 +99,16 @@ TEST(Completion, KnowsEveryOptionOfEveryCommand) {
   expect_options("dtactctl", ctl::run,
                  {{},
                   {"status"},
+                  {"camera"},
                   {"cameras"},
                   {"watch"},
                   {"setup"},
                   {"bench"},
                   {"find"},
+                  {"fleet"},
+                  {"fleet", "status"},
+                  {"fleet", "upload"},
+                  {"fleet", "rezero"},
                   {"led"},
                   {"rezero"},
                   {"reconstruction"},

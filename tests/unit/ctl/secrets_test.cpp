@@ -107,27 +107,47 @@ TEST(Cert, SaysWhatItNeeds) {
   }
 }
 
-TEST(Token, IsALineThatTheDaemonTakes) {
-  const auto result = ctl({"token", "--new", "view", "--name", "arm_left"});
+TEST(Token, IsInTheClientsFileAndItsHashInTheLine) {
+  const TempFolder folder;
+  const fs::path file = folder.path() / "arm.token";
+  const auto result = ctl({"token", "--new", "view", "--name", "arm_left", "-o", file.string()});
   ASSERT_EQ(result.code, 0) << result.error;
-  EXPECT_THAT(result.out, MatchesRegex("view [0-9a-f]{64} arm_left\n"));
-  const net::Tokens tokens(result.out, "f");
-  const auto grant = tokens.find(result.out.substr(5, 64));
+  EXPECT_THAT(result.out, MatchesRegex("view sha256:[0-9a-f]{64} arm_left\n"));
+  const std::string token = client::read_token(file);
+  EXPECT_THAT(token, MatchesRegex("[0-9a-f]{64}"));
+  const auto grant = net::Tokens(result.out, "f").find(token);
   ASSERT_TRUE(grant.has_value());
   EXPECT_EQ(grant->rights, net::Rights::view);
   EXPECT_EQ(grant->name, "arm_left");
+  // The same line can be had again, for other rights too; the client keeps its token.
+  EXPECT_EQ(
+      ctl({"token", "--hash", "view", "--name", "arm_left", "--token-file", file.string()}).out,
+      result.out);
+  EXPECT_THAT(ctl({"token", "--new", "view", "-o", file.string()}).error,
+              HasSubstr("arm.token is there already, and a client may use it"));
+  EXPECT_EQ(client::read_token(file), token);
+  EXPECT_NE(ctl({"token", "--new", "view", "-o", file.string() + "2"}).out.substr(0, 76),
+            result.out.substr(0, 76));
 }
 
-TEST(Token, IsAnotherEachTime) {
-  const auto token = [] { return ctl({"token", "--new", "control"}).out; };
-  EXPECT_THAT(token(), MatchesRegex("control [0-9a-f]{64}\n"));
-  EXPECT_NE(token(), token());
+TEST(Token, IsHashedOnlyIfItCannotBeGuessed) {
+  const TempFolder folder;
+  const fs::path file = folder.path() / "token";
+  base::write_file_atomically(file, std::string(31, 'x') + "\n", 0600);
+  EXPECT_THAT(ctl({"token", "--hash", "view", "--token-file", file.string()}).error,
+              HasSubstr("has 31 bytes, its hash would reveal one with fewer than 32"));
+  base::write_file_atomically(file, std::string(32, 'x') + "\n", 0600);
+  EXPECT_EQ(ctl({"token", "--hash", "control", "--token-file", file.string()}).out,
+            "control sha256:c62e4615bd39e222572f3a1bf7c2132ea1e65b17ec805047bd6b2842c593493f\n");
+  EXPECT_THAT(ctl({"token", "--hash", "view"}).error, HasSubstr("has 0 bytes"));
 }
 
-TEST(Token, IsForViewOrControl) {
+TEST(Token, SaysWhatItNeeds) {
   EXPECT_EQ(ctl({"token"}).code, 2);
-  EXPECT_EQ(ctl({"token", "--new", "all"}).code, 2);
-  EXPECT_EQ(ctl({"token", "--new", "view", "--name", "a b"}).code, 2);
+  EXPECT_EQ(ctl({"token", "--new", "all", "-o", "x"}).code, 2);
+  EXPECT_EQ(ctl({"token", "--new", "view"}).code, 2);
+  EXPECT_EQ(ctl({"token", "--new", "view", "-o", "x", "--hash", "view"}).code, 2);
+  EXPECT_EQ(ctl({"token", "--new", "view", "-o", "x", "--name", "a b"}).code, 2);
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 #include <linux/videodev2.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <stdexcept>
 

@@ -34,7 +34,7 @@ TEST(Usage, AsksForACommandWhereThereIsNone) {
 
 TEST(Usage, RefusesJsonWhereThereIsNothingToPrint) {
   EXPECT_THAT(reported({"rezero", "--json"}), HasSubstr("--json"));
-  EXPECT_THAT(reported({"token", "--new", "view", "--json"}), HasSubstr("--json"));
+  EXPECT_THAT(reported({"token", "--new", "view", "-o", "x", "--json"}), HasSubstr("--json"));
   EXPECT_THAT(reported({"watch", "--draw", "--json"}), HasSubstr("--json"));
 }
 
@@ -43,6 +43,7 @@ TEST(Usage, RefusesWhatIsNoNumber) {
   for (const char* number : {"nan", "NaN", "-nan", "inf", "1e-300", "1e300", "-1", "1x", ""}) {
     EXPECT_THAT(reported({"snapshot", "-o", "x.png", "--timeout", number}), HasSubstr("--timeout"))
         << number;
+    EXPECT_THAT(reported({"camera", "--exposure", number}), HasSubstr("--exposure")) << number;
     EXPECT_THAT(reported({"reconstruction", "--max-error-um", number}), HasSubstr("--max-error-um"))
         << number;
   }
@@ -73,16 +74,18 @@ TEST(CommandLine, HoldsEveryOptionThatWasGiven) {
 }
 
 TEST(Usage, NamesEveryMeaningOfExitCodeFour) {
-  for (const char* meaning :
-       {"watch --min-fps", "bench: no frame", "find: no daemon", "guided: ended without a"}) {
+  for (const char* meaning : {"watch --min-fps", "bench: no frame", "find, fleet: no daemon",
+                              "guided: ended\nwithout a calibration"}) {
     EXPECT_THAT(cli::kExitCodesHelp, HasSubstr(meaning));
   }
 }
 
 TEST(Usage, SaysWhenTheOutputCouldNotBeWritten) {
+  const calibration::TempFolder folder;
   std::ofstream full("/dev/full");
   std::ostringstream error;
-  EXPECT_EQ(run({"token", "--new", "view"}, full, error), 1);
+  EXPECT_EQ(run({"token", "--new", "view", "-o", (folder.path() / "token").string()}, full, error),
+            1);
   EXPECT_THAT(error.str(), HasSubstr("the output could not be written: is the disk full?"));
 }
 

@@ -170,5 +170,31 @@ TEST(LibcameraPhotometry, ConfirmsNothingThatTheFramesDoNotSay) {
   EXPECT_EQ(entry.note, "set; this camera's frames do not say what came of it");
 }
 
+TEST(LibcameraPhotometry, ChangesExposureAndGainWithinWhatAFrameLeaves) {
+  const PiSensor sensor;
+  const PhotometricLock lock(exposure(6000), 60);
+  auto requested_controls = lock.requested_controls(sensor.offered());
+  auto& controls = requested_controls.controls;
+  (void)PhotometricLock::compare(sensor.run(requested_controls.list), controls);
+  CameraSettings settings = lock.settings(sensor.offered(), controls);
+  ASSERT_TRUE(settings.exposure_us && settings.gain);
+  EXPECT_EQ(settings.exposure_us->value, 6000);
+  EXPECT_EQ(settings.exposure_us->minimum, 60);
+  EXPECT_NEAR(settings.exposure_us->maximum, 15000, 1);
+  EXPECT_EQ(settings.gain->value, 1);
+  EXPECT_EQ(settings.gain->maximum, 16);
+  lc::ControlList list =
+      PhotometricLock::changed_controls({.exposure_us = 4170, .gain = 2.5}, controls);
+  EXPECT_EQ(*list.get(lc::controls::ExposureTime), 4170);
+  EXPECT_EQ(*list.get(lc::controls::AnalogueGain), 2.5F);
+  list.merge(requested_controls.list);
+  EXPECT_EQ(PhotometricLock::compare(sensor.run(list), controls), "");
+  PhotometricLock::read_back(controls, settings);
+  EXPECT_EQ(settings.exposure_us->value, 4170);
+  EXPECT_EQ(settings.gain->value, 2.5);
+  EXPECT_EQ(control(controls, "exposure_time").verdict, ControlVerdict::confirmed);
+  EXPECT_FALSE(lock.settings({}, controls).exposure_us.has_value());
+}
+
 }  // namespace
 }  // namespace dtact::hal::libcamera_backend

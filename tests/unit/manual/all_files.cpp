@@ -2,6 +2,7 @@
 
 #include "clients/calibrate/calibrate.hpp"
 #include "clients/ctl/ctl.hpp"
+#include "clients/dds/dds.hpp"
 #include "clients/perceive/perceive.hpp"
 #include "clients/web/web.hpp"
 #include "daemon/app/options.hpp"
@@ -19,6 +20,7 @@ const PageName kCtl{"dtactctl", 1};
 const PageName kCalibrate{"dtact-calibrate", 1};
 const PageName kPerceive{"dtact-perceive", 1};
 const PageName kWeb{"dtact-web", 1};
+const PageName kDds{"dtact-dds", 1};
 
 }  // namespace
 
@@ -50,6 +52,13 @@ Command dtact_perceive() {
   return describe(app);
 }
 
+Command dtact_dds() {
+  cli::Context context{{}, false, std::cout};
+  CLI::App app;
+  dds::set_up(app, context);
+  return describe(app);
+}
+
 Command dtact_web() {
   cli::Context context{{}, false, std::cout};
   CLI::App app;
@@ -63,6 +72,7 @@ std::vector<File> all_files(const std::filesystem::path& root) {
   const Command calibrate = dtact_calibrate();
   const Command perceive = dtact_perceive();
   const Command web = dtact_web();
+  const Command dds = dtact_dds();
   const PageNotes of_daemon{
       8,
       "System Administration",
@@ -87,10 +97,11 @@ std::vector<File> all_files(const std::filesystem::path& root) {
         "dtactd@NAME.tokens and so on. They stay when the package is purged."},
        {"/etc/systemd/system/dtactd.service.d",
         "What `systemctl edit dtactd` has written. It stays when the package is purged."}},
-      {kConfig, kCtl, kCalibrate, kPerceive, kWeb, {"systemctl", 1}, {"journalctl", 1}}};
+      {kConfig, kCtl, kCalibrate, kPerceive, kWeb, kDds, {"systemctl", 1}, {"journalctl", 1}}};
   const PageNotes of_ctl{1, kUserCommands, {}, {kCalibrate, kDtactd, kConfig}};
   const PageNotes of_calibrate{1, kUserCommands, {}, {kCtl, kDtactd, kConfig}};
   const PageNotes of_perceive{1, kUserCommands, {}, {kDtactd, kCtl, kWeb}};
+  const PageNotes of_dds{1, kUserCommands, {}, {kDtactd, kCtl, kPerceive}};
   const PageNotes of_web{1, kUserCommands, {}, {kDtactd, kCtl, kPerceive}};
 
   return {
@@ -99,12 +110,14 @@ std::vector<File> all_files(const std::filesystem::path& root) {
       {"clients/calibrate/dtact-calibrate.1", program_page(calibrate, of_calibrate)},
       {"clients/perceive/dtact-perceive.1", program_page(perceive, of_perceive)},
       {"clients/web/dtact-web.1", program_page(web, of_web)},
+      {"clients/dds/dtact-dds.1", program_page(dds, of_dds)},
       {"config/dtactd.toml.5", config_page(base::read_file(root / "config/dtactd.toml"))},
       {"daemon/dtactd.zsh-completion", zsh_completion(daemon)},
       {"clients/ctl/dtactctl.zsh-completion", zsh_completion(ctl)},
       {"clients/calibrate/dtact-calibrate.zsh-completion", zsh_completion(calibrate)},
       {"clients/perceive/dtact-perceive.zsh-completion", zsh_completion(perceive)},
       {"clients/web/dtact-web.zsh-completion", zsh_completion(web)},
+      {"clients/dds/dtact-dds.zsh-completion", zsh_completion(dds)},
   };
 }
 

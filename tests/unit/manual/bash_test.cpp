@@ -19,6 +19,7 @@ struct Completion {
 };
 const Completion kDtactd{"daemon/dtactd.bash-completion", "_dtactd"};
 const Completion kPerceive{"clients/perceive/dtact-perceive.bash-completion", "_dtact_perceive"};
+const Completion kDds{"clients/dds/dtact-dds.bash-completion", "_dtact_dds"};
 const Completion kWeb{"clients/web/dtact-web.bash-completion", "_dtact_web"};
 
 /// Words that bash offers for the last of `words`, which are separated by blanks.
@@ -73,6 +74,8 @@ void expect_every_option(const Completion& completion, const Command& program) {
 }
 
 TEST(Bash, OffersEveryOptionOfDtactPerceive) { expect_every_option(kPerceive, dtact_perceive()); }
+
+TEST(Bash, OffersEveryOptionOfDtactDds) { expect_every_option(kDds, dtact_dds()); }
 
 TEST(Bash, OffersEveryOptionOfDtactWeb) { expect_every_option(kWeb, dtact_web()); }
 

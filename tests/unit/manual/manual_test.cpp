@@ -79,7 +79,7 @@ TEST(Manual, SaysOfAnOptionWhatHelpSays) {
   double seconds = 5;
   std::vector<std::string> files;
   bool quiet = false;
-  auto* listed = app.add_option("-s,--seconds", seconds, "For so long")
+  auto* listed = app.add_option("-s,--seconds", seconds, "Seconds to run")
                      ->capture_default_str()
                      ->check(CLI::PositiveNumber);
   app.add_option("FILES", files, "What to read")->check(CLI::ExistingFile);

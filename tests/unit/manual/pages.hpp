@@ -37,6 +37,7 @@ struct PageNotes {
 [[nodiscard]] Command dtact_calibrate();
 [[nodiscard]] Command dtact_perceive();
 [[nodiscard]] Command dtact_web();
+[[nodiscard]] Command dtact_dds();
 
 /// A generated file, by its path in the tree.
 struct File {

@@ -81,7 +81,9 @@ std::string function(const std::string& name, const Command& command, const std:
     std::string what = "_arguments -s $everywhere" + specs(below);
     if (!below.commands.empty()) {
       what = name + "_" + below.name;
-      before += function(what, below, "") + "\n";
+      const std::string options =
+          below.options.empty() ? "" : fmt::format("  everywhere+=({}\n  )\n", specs(below));
+      before += function(what, below, options) + "\n";
     }
     cases += fmt::format("        {}) {} ;;\n", below.name, what);
   }

@@ -84,14 +84,14 @@ void collect(const std::string& line, const Command& command, const Words& every
 TEST_F(Zsh, OffersEveryCommandAndOption) {
   std::map<std::string, Words> expected;
   for (const Command& program :
-       {dtactctl(), dtact_calibrate(), dtact_perceive(), dtact_web(), dtactd()}) {
+       {dtactctl(), dtact_calibrate(), dtact_perceive(), dtact_web(), dtact_dds(), dtactd()}) {
     collect(program.name, program, long_names(program.options), expected);
   }
   std::vector<std::string> lines;
   for (const auto& [line, words] : expected) lines.push_back(line);
-  // dtactctl, its 15 commands, 7 of calibration; dtact-calibrate and its 8; dtact-perceive and its
-  // 2; dtact-web; dtactd.
-  EXPECT_EQ(lines.size(), 1U + 15 + 7 + 2 + 1 + 8 + 1 + 1 + 2 + 1 + 1 + 1);
+  // dtactctl, its 17 commands, 7 of calibration, 3 of fleet; dtact-calibrate, its 9, 5 of objects;
+  // dtact-perceive and its 2; dtact-web; dtact-dds; dtactd.
+  EXPECT_EQ(lines.size(), 1U + 17 + 7 + 3 + 3 + 1 + 9 + 6 + 1 + 1 + 2 + 1 + 1 + 1 + 1);
   for (const auto& [line, words] : offers(lines)) {
     EXPECT_THAT(expected.at(line), IsSubsetOf(words)) << line;
   }
@@ -100,8 +100,8 @@ TEST_F(Zsh, OffersEveryCommandAndOption) {
 TEST_F(Zsh, OffersValuesAndFiles) {
   std::fclose(std::fopen((folder_ / "press.mcap").c_str(), "w"));
   fs::create_directory(folder_ / "calibration");
-  const Words files{"calibration", "press.mcap",      "_dtactctl", "_dtact-calibrate",
-                    "_dtactd",     "_dtact-perceive", "_dtact-web"};
+  const Words files{"calibration", "press.mcap",      "_dtactctl",  "_dtact-calibrate",
+                    "_dtactd",     "_dtact-perceive", "_dtact-web", "_dtact-dds"};
   const std::map<std::string, Words> expected{
       {"dtactctl export press.mcap --to ", {"npy", "png", "ply", "pcd", "csv"}},
       {"dtact-calibrate depth --method=p", {"published"}},

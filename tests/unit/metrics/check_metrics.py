@@ -17,6 +17,7 @@ except ImportError:
 # prometheus.io/docs/practices/naming: base units only.
 NOT_BASE = re.compile(r"_(ms|us|ns|milliseconds|microseconds|nanoseconds|percent|mm|kb|mb)(_|$)")
 QUERIED = re.compile(r"\bdtactd_[a-z0-9_]+\b")
+SELECTED = re.compile(r"\b(dtactd_[a-z0-9_]+)\{([^}]*)\}")
 
 
 def complaints_of_family(family):
@@ -66,7 +67,8 @@ def expressions(node):
             yield from expressions(child)
 
 
-def complaints_of_dashboard(path, known):
+def complaints_of_dashboard(path, samples):
+    known = {sample.name for sample in samples}
     with open(path, encoding="utf-8") as file:
         queries = list(expressions(json.load(file)))
     if not queries:
@@ -77,6 +79,10 @@ def complaints_of_dashboard(path, known):
         for name in QUERIED.findall(query):
             if name not in known:
                 yield f"{path}: the daemon has no {name}"
+        for name, selectors in SELECTED.findall(query):
+            for label, value in re.findall(r'(\w+)="([^"]*)"', selectors):
+                if not any(s.name == name and s.labels.get(label) == value for s in samples):
+                    yield f"{path}: no {name} has {label}=\"{value}\""
 
 
 def main():
@@ -87,8 +93,8 @@ def main():
                   if f.name == "dtactd_camera_info"]
     if identities != ['a "quoted"\\name\nof two lines']:
         found.append(f"an odd label came back as {identities}")
-    known = {sample.name for family in families for sample in family.samples}
-    found += complaints_of_dashboard(sys.argv[1], known)
+    samples = [sample for family in families for sample in family.samples]
+    found += complaints_of_dashboard(sys.argv[1], samples)
     print("\n".join(found + [f"{len(families)} metrics, {len(found)} complaints"]))
     return 1 if found or not families else 0
 

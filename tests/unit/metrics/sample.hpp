@@ -50,13 +50,13 @@ inline net::Overview overview() {
   for (int i = 0; i < 10; ++i) times.add(3'000'000'000);
   all.stages = {pipeline::summarise("total", times)};
   all.traffic = {20, 1, 300, 9, 12345};
+  all.temperatures = {{"thermal_zone0", "cpu-thermal", 48.312}};
   all.reference_taken_ns = 2'000'000'000;
   return all;
 }
 
 inline std::string sample() {
-  return text(overview(), {{"thermal_zone0", "cpu-thermal", 48.312}},
-              {.used = 3000, .free = 500, .mapped = 2000}, 5'500'000'000);
+  return text(overview(), {.used = 3000, .free = 500, .mapped = 2000}, 5'500'000'000);
 }
 
 }  // namespace dtact::metrics::test

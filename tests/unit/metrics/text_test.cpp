@@ -71,10 +71,10 @@ TEST(Heap, CountsWhatIsInUse) {
   constexpr std::size_t kSmall = 1000;
   constexpr std::size_t kCount = 1000;
   constexpr std::size_t kLarge = std::size_t{64} << 20U;
-  const Heap before = heap();
+  const base::Heap before = base::heap();
   std::vector<std::string> blocks(kCount, std::string(kSmall, 'x'));
   blocks.emplace_back(kLarge, 'x');
-  const Heap now = heap();
+  const base::Heap now = base::heap();
   EXPECT_GE(now.used - now.mapped, before.used - before.mapped + kCount * kSmall);
   EXPECT_GE(now.mapped, before.mapped + kLarge);
   EXPECT_GE(now.used, before.used + kLarge + kCount * kSmall);
@@ -82,7 +82,7 @@ TEST(Heap, CountsWhatIsInUse) {
 }
 
 TEST(MetricsText, LeavesOutWhatIsNotKnown) {
-  const std::string text = metrics::text({}, {}, {}, 0);
+  const std::string text = metrics::text({}, {}, 0);
   EXPECT_THAT(text, AllOf(Not(HasSubstr("reference_age")), Not(HasSubstr("calibration_info")),
                           Not(HasSubstr("temperature"))));
 }
@@ -98,13 +98,13 @@ TEST(Temperatures, AreThoseThatAnswer) {
   zone("thermal_zone0", "cpu-thermal", "48312");
   zone("thermal_zone2", "asleep", nullptr);
   zone("cooling_device0", "fan", "0");
-  const auto found = temperatures(folder);
+  const auto found = base::temperatures(folder);
   ASSERT_EQ(found.size(), 2U);
   EXPECT_EQ(found[0].zone, "thermal_zone0");
   EXPECT_EQ(found[0].type, "cpu-thermal");
   EXPECT_DOUBLE_EQ(found[0].celsius, 48.312);
   EXPECT_DOUBLE_EQ(found[1].celsius, -5.25);
-  EXPECT_TRUE(temperatures(folder / "none").empty());
+  EXPECT_TRUE(base::temperatures(folder / "none").empty());
   fs::remove_all(folder);
 }
 

@@ -30,6 +30,7 @@ TEST(Advice, HasASentenceForEveryCondition) {
     pipeline::Status status;
     status.health.set(static_cast<Health>(i));
     EXPECT_NE(advice(status), "") << i;
+    EXPECT_EQ(fix(status, static_cast<Health>(i)), advice(status)) << i;
   }
 }
 
@@ -95,6 +96,7 @@ TEST(Advice, SaysWhatToCheckInADarkPictureInsteadOfStartingUp) {
                 StartsWith("The picture is too dark to measure in: check the ring's "
                            "power and wiring"));
     EXPECT_THAT(advice(status), Not(HasSubstr("keep the surface free")));
+    EXPECT_EQ(fix(status, waits), "It waits for a picture that is bright enough.");
   }
 }
 

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/inotify.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <array>
@@ -412,6 +413,22 @@ TEST_F(Store, PassesOverWhatIsNotItsOwn) {
   store.keep(whole("pins"));
   EXPECT_THAT(numbers(store.list()), ElementsAre(1, 2));
   EXPECT_TRUE(fs::exists(state_ / "calibrations/notes"));
+}
+
+// Before: the daemon waited for ever for somebody to write into them.
+TEST_F(Store, PipesInPlaceOfItsFilesAreNotWaitedFor) {
+  FolderCalibrationStore store(state_, {});
+  store.keep(whole("ball"));
+  for (const fs::path& file :
+       {numbered(1) / "ball/calibration.toml", numbered(1).parent_path() / "recent",
+        state_ / "calibration.starts"}) {
+    fs::remove(file);
+    ASSERT_EQ(::mkfifo(file.c_str(), 0600), 0);
+  }
+  EXPECT_TRUE(FolderCalibrationStore(state_, {}).begin_start());
+  EXPECT_NE(store.list().at(0).damage, "");
+  store.keep(whole("pins"));
+  EXPECT_THAT(numbers(store.list()), ElementsAre(1, 2));
 }
 
 TEST_F(Store, SaysThatTheLinkLeadsElsewhere) {

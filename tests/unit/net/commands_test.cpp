@@ -215,6 +215,8 @@ TEST(GetStatus, ReportsEverything) {
   EXPECT_EQ(reply.state(), v1::STATE_SERVING);
   EXPECT_EQ(reply.health(0), v1::HEALTH_LIGHT_MISMATCH);
   EXPECT_THAT(reply.advice(), HasSubstr("dtactctl led"));
+  ASSERT_EQ(reply.fixes_size(), reply.health_size());
+  EXPECT_THAT(reply.fixes(0), HasSubstr("dtactctl led"));
   EXPECT_EQ(reply.camera().backend(), "sim");
   EXPECT_EQ(reply.camera().width(), 800U);
   EXPECT_EQ(reply.camera().state(), "stalled");

@@ -2,13 +2,35 @@
 #include <gtest/gtest.h>
 
 #include <chrono>
+#include <filesystem>
+#include <fstream>
 #include <thread>
+#include <utility>
 
+#include "tests/fakes/own_path.hpp"
 #include "tests/unit/net/raw_client.hpp"
 #include "tests/unit/net/rig.hpp"
 
 namespace dtact::net::test {
 namespace {
+
+TEST(Overview, HasTheHottestOfTheBoardsTemperatures) {
+  NetConfig config;
+  config.thermal_folder = fakes::own_path();
+  for (const auto& [zone, temp] : {std::pair{"thermal_zone0", 48312}, {"thermal_zone1", 51700}}) {
+    std::filesystem::create_directories(config.thermal_folder / zone);
+    std::ofstream(config.thermal_folder / zone / "temp") << temp << '\n';
+  }
+  Rig rig(config);
+  Overview now = rig.overview();
+  for (int i = 0; i < 2000 && now.temperatures.empty(); ++i) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    now = rig.overview();
+  }
+  EXPECT_EQ(now.temperatures.size(), 2U);
+  EXPECT_DOUBLE_EQ(now.status.board_celsius(), 51.7);
+  std::filesystem::remove_all(config.thermal_folder);
+}
 
 TEST(Overview, CountsClientsThatLeftToo) {
   NetConfig config;

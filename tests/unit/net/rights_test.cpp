@@ -6,6 +6,7 @@
 
 #include "daemon/serve/security.hpp"
 #include "hal/base/atomic_file.hpp"
+#include "proto/fingerprint.hpp"
 #include "tests/unit/calibration/sample.hpp"
 #include "tests/unit/net/raw_client.hpp"
 #include "tests/unit/net/rig.hpp"
@@ -28,8 +29,9 @@ class Guarded : public ::testing::Test {
   Guarded() {
     config_.token_file = folder_.path() / "tokens";
     base::write_file_atomically(config_.token_file,
-                                "view 0123456789abcdef eye\ncontrol fedcba9876543210 hand\n"
-                                "calibrate 89abcdef01234567 bench\n",
+                                "view " + wire::token_hash(kView) + " eye\ncontrol " +
+                                    wire::token_hash(kControl) + " hand\ncalibrate " +
+                                    wire::token_hash(kCalibrate) + " bench\n",
                                 0600);
   }
 
@@ -112,6 +114,7 @@ TEST_F(Guarded, LetsViewersViewAndNothingElse) {
   using M = v1::ClientMessage;
   for (const auto& request :
        {message_of([](M& m) { m.mutable_set_light()->set_brightness(3); }),
+        message_of([](M& m) { m.mutable_set_camera()->set_gain(2); }),
         message_of([](M& m) { m.mutable_rezero(); }),
         message_of([](M& m) { m.mutable_upload_calibration()->set_name("x"); }),
         message_of([](M& m) { m.mutable_activate_calibration()->set_number(1); }),
@@ -174,6 +177,10 @@ TEST_F(Guarded, ALineNamesWhoChangedWhatAndTheResult) {
   }));
   (void)controller.request(
       message_of([](M& m) { m.mutable_set_reconstruction()->set_sharpen("off"); }));
+  (void)controller.request(message_of([](M& m) {
+    m.mutable_set_camera()->set_exposure_us(4170);
+    m.mutable_set_camera()->set_gain(1.5);
+  }));
   (void)controller.request(
       message_of([](M& m) { m.mutable_activate_calibration()->set_number(7); }));
   (void)controller.request(message_of([](M& m) { m.mutable_get_status(); }));
@@ -193,6 +200,8 @@ TEST_F(Guarded, ALineNamesWhoChangedWhatAndTheResult) {
   EXPECT_THAT(log, Not(HasSubstr(std::string(256, 'x'))));
   EXPECT_THAT(log, HasSubstr("xx: rezero force: done\n"));
   EXPECT_THAT(log, HasSubstr(who + "set_reconstruction sharpen \"off\": done\n"));
+  EXPECT_THAT(log, HasSubstr(who + "set_camera exposure_us 4170, gain 1.5: set_camera.exposure_us: "
+                                   "this camera has no such control\n"));
   EXPECT_THAT(log, HasSubstr(who + "activate_calibration 7: this client may not change calibr"));
   EXPECT_THAT(log,
               HasSubstr(" (raw, token bench): upload_calibration \"ball\", 4 and 5 bytes: done, "
@@ -225,8 +234,10 @@ TEST_F(Guarded, AReloadEndsWhoseTokenIsGoneOrHasOtherRights) {
   RawClient calibrator(rig.tcp_port());
   calibrator.hello(kCalibrate);
   // Another name changes nothing.
-  base::write_file_atomically(config_.token_file,
-                              "view 0123456789abcdef ear\nview 89abcdef01234567 bench\n", 0600);
+  base::write_file_atomically(
+      config_.token_file,
+      "view " + wire::token_hash(kView) + " ear\nview " + wire::token_hash(kCalibrate) + " bench\n",
+      0600);
   rig.reload(config_);
   for (RawClient* ended : {&controller, &calibrator}) {
     const auto reply = ended->reply();

@@ -1,6 +1,7 @@
 // Changes of the light by clients, and the events that follow.
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <string>
 #include <variant>
 
@@ -81,6 +82,7 @@ TEST(SetLight, NamesTheFieldThatIsWrong) {
   expect_invalid(client, brightness(256), "set_light.brightness: 256; allowed are 0 to 255");
   expect_invalid(client, scheme("disco"),
                  "\"disco\" is unknown; known are all, scheme1, scheme2, scheme3, scheme4");
+  expect_invalid(client, scheme(std::string(60'000, 'x')), std::string(64, 'x') + "\" is unknown");
   v1::ClientMessage message;
   message.mutable_set_light()->add_leds();
   expect_invalid(client, message, "1 colours, the ring has 8");
@@ -190,6 +192,35 @@ TEST(SetLight, SaysWhatIsWrongWithTheRing) {
   EXPECT_EQ(reply.error().message(), "/dev/spidev0.0: check the wiring");
   outcome = Outcome::ring_away;
   EXPECT_EQ(client.request(brightness(10)).error().code(), v1::ERROR_DEVICE);
+}
+
+TEST(SetCamera, PassesWhatIsInRangeAndAnswersWithWhatTheCameraHas) {
+  Rig rig({}, [](FakePort& port) {
+    pipeline::Status status;
+    status.camera.settings.exposure_us = {.value = 8300, .minimum = 100, .maximum = 50000};
+    port.set_status(status);
+    answer_done(port);
+  });
+  RawClient client(rig.tcp_port());
+  client.hello();
+  v1::ClientMessage message;
+  message.mutable_set_camera()->set_exposure_us(4170);
+  const auto reply = client.request(message);
+  EXPECT_EQ(reply.camera().exposure_us().value(), 8300);  // as the port says
+  EXPECT_EQ(reply.camera().exposure_us().maximum(), 50000);
+  EXPECT_FALSE(reply.camera().has_gain());
+  const auto command = rig.port.wait_command(0);
+  ASSERT_TRUE(command.has_value());
+  const auto& change = std::get<pipeline::SetCamera>(command->what).change;
+  EXPECT_EQ(change.exposure_us, 4170);
+  EXPECT_EQ(change.gain, std::nullopt);
+  for (const double us : {99.0, 50001.0, std::nan("")}) {
+    message.mutable_set_camera()->set_exposure_us(us);
+    expect_invalid(client, message, "; this camera has 100 to 50000");
+  }
+  message.mutable_set_camera()->set_exposure_us(4170);
+  message.mutable_set_camera()->set_gain(2);
+  expect_invalid(client, message, "set_camera.gain: this camera has no such control");
 }
 
 }  // namespace

@@ -73,6 +73,8 @@ TEST(SetReconstruction, NamesTheFieldThatIsWrong) {
       "set_reconstruction.resolution: \"best\" is unknown; known are full, half, quarter");
   expect_invalid(client, asking([](auto& change) { change.set_sharpen("3"); }),
                  "set_reconstruction.sharpen: \"3\" is unknown; known are off, auto, 1, 2");
+  expect_invalid(client, asking([](auto& change) { change.set_sharpen(std::string(60'000, '1')); }),
+                 "\"" + std::string(64, '1') + "\" is unknown");
   for (const double bound : {0.0, -5.0, 10001.0, std::numeric_limits<double>::quiet_NaN()}) {
     expect_invalid(client, asking([&](auto& change) { change.set_max_error_um(bound); }),
                    "allowed are 1 to 10000");

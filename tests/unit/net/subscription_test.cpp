@@ -247,12 +247,20 @@ TEST(Subscription, EachProgramServesItsOwnParts) {
   EXPECT_FALSE(cloud.pose);
   EXPECT_TRUE(made.kind(Subscription::kPose).pose);
   EXPECT_EQ(made.kind(Subscription::kPose).cloud, 0);
+  EXPECT_EQ(made.kind(Subscription::kPose).recognition, 0);
+  v1::Subscribe recognition;
+  recognition.set_recognition(true);
+  const auto recognised = Subscription::from(recognition, {}, Serves::geometry);
+  EXPECT_EQ(std::get<Subscription>(recognised).kind(Subscription::kRecognition).recognition, 1);
   const auto code_of = [](const v1::Subscribe& request, Serves serves) {
     const auto from = Subscription::from(request, {}, serves);
     const auto* refusal = std::get_if<Refusal>(&from);
     return refusal == nullptr ? 0 : refusal->code;
   };
   EXPECT_EQ(code_of(points, Serves::images), v1::ERROR_UNSUPPORTED);
+  EXPECT_EQ(code_of(recognition, Serves::images), v1::ERROR_UNSUPPORTED);
+  recognition.set_recognition_presses(11);
+  EXPECT_EQ(code_of(recognition, Serves::geometry), v1::ERROR_INVALID);
   v1::Subscribe depth;
   depth.set_depth(v1::DEPTH_INT16);
   EXPECT_EQ(code_of(depth, Serves::images), 0);

@@ -11,6 +11,7 @@
 
 #include "daemon/serve/private_file.hpp"
 #include "hal/base/atomic_file.hpp"
+#include "proto/fingerprint.hpp"
 #include "tests/unit/calibration/sample.hpp"
 
 namespace dtact::net::test {
@@ -30,11 +31,17 @@ std::string refusal(const std::string& text) {
   }
 }
 
+// What sha256sum prints of 0123456789abcdef and of fedcba9876543210.
+constexpr const char* kHash =
+    "sha256:9f9f5111f7b27a781f1f1ddde5ebc2dd2b796bfc7365c9c28b548e564176929f";
+constexpr const char* kOtherHash =
+    "sha256:3465f6e6975baa864ca957f0914ecda9bf7eb601ac31ac20a5dc3d329279a843";
+
 TEST(Tokens, GrantWhatTheirLineSays) {
-  const Tokens tokens(
-      "# for the gripper\n\n  control 0123456789abcdef arm_left\r\nview\tfedcba9876543210\n"
-      "calibrate 89abcdef01234567 bench",
-      "f");
+  const Tokens tokens(std::string("# for the gripper\n\n  control ") + kHash +
+                          " arm_left\r\nview\t" + kOtherHash + "\ncalibrate " +
+                          wire::token_hash("89abcdef01234567") + " bench",
+                      "f");
   EXPECT_EQ(tokens.find("0123456789abcdef")->rights, Rights::control);
   EXPECT_EQ(tokens.find("0123456789abcdef")->name, "arm_left");
   EXPECT_EQ(tokens.find("fedcba9876543210")->rights, Rights::view);
@@ -43,31 +50,38 @@ TEST(Tokens, GrantWhatTheirLineSays) {
 }
 
 TEST(Tokens, KnowNoOthers) {
-  const Tokens tokens("view 0123456789abcdef\n", "f");
+  const Tokens tokens(std::string("view ") + kHash + "\n", "f");
+  // A reader of the file has the hash, and cannot enter with it.
   for (const char* other :
-       {"", "0123456789abcde", "0123456789abcdef0", "0123456789abcdeF", "view 0123456789abcdef"}) {
+       {"", "0123456789abcde", "0123456789abcdef0", "0123456789abcdeF", kHash, kHash + 7}) {
     EXPECT_FALSE(tokens.find(other).has_value()) << other;
   }
 }
 
 TEST(Tokens, NameFileLineAndFix) {
-  EXPECT_THAT(refusal("# a\nmay 0123456789abcdef\n"), HasSubstr("/etc/tokens:2: a line is \"view"));
+  const std::string hash = kHash;
+  EXPECT_THAT(refusal("# a\nmay " + hash + "\n"), HasSubstr("/etc/tokens:2: a line is \"view"));
   EXPECT_THAT(refusal("view\n"), HasSubstr("/etc/tokens:1: a line is"));
-  EXPECT_THAT(refusal("view 0123456789abcdef a b\n"), HasSubstr("/etc/tokens:1: a line is"));
-  EXPECT_THAT(refusal("view 0123456789abcde\n"),
-              HasSubstr("the token has 15 bytes, allowed are 16 to 256"));
-  EXPECT_THAT(refusal("view " + std::string(257, 'x')), HasSubstr("the token has 257 bytes"));
-  EXPECT_EQ(refusal("view " + std::string(256, 'x')), "");
-  EXPECT_THAT(refusal("view 0123456789abcdef\xc3\xa4\n"), HasSubstr("only printable ASCII"));
-  EXPECT_THAT(refusal("view 0123456789abcdef\ncontrol 0123456789abcdef\n"),
+  EXPECT_THAT(refusal("view " + hash + " a b\n"), HasSubstr("/etc/tokens:1: a line is"));
+  EXPECT_THAT(
+      refusal("#\ncontrol 0123456789abcdef0123456789abcdef arm\n"),
+      HasSubstr("/etc/tokens:2: a token itself must not be kept here, only its hash: with the "
+                "token in FILE, dtactctl token --hash control --token-file FILE prints"));
+  std::string upper = hash;
+  upper.back() = 'A';
+  for (const std::string& wrong : {hash.substr(0, 70), hash + "0", upper, std::string("sha256:")}) {
+    EXPECT_THAT(refusal("view " + wrong), HasSubstr("followed by 64 hexadecimal digits")) << wrong;
+  }
+  EXPECT_THAT(refusal("view " + hash + "\xc3\xa4\n"), HasSubstr("only printable ASCII"));
+  EXPECT_THAT(refusal("view " + hash + "\ncontrol " + hash + "\n"),
               HasSubstr("/etc/tokens:2: the same token stands on a line above"));
   EXPECT_THAT(refusal(""), HasSubstr("holds no token"));
-  EXPECT_THAT(refusal("#\n"), HasSubstr("dtactctl token --new control prints one"));
+  EXPECT_THAT(refusal("#\n"), HasSubstr("dtactctl token --new control -o FILE prints one"));
 }
 
 TEST(Tokens, AreNotReportedInErrors) {
   EXPECT_THAT(refusal("contrlo 0123456789abcdef\n"), Not(HasSubstr("0123456789abcdef")));
-  EXPECT_THAT(refusal("view 0123456789abcde\n"), Not(HasSubstr("0123456789abcde")));
+  EXPECT_THAT(refusal("view 0123456789abcdef\n"), Not(HasSubstr("0123456789abcdef")));
 }
 
 std::string unreadable(const std::filesystem::path& path) {

@@ -12,6 +12,7 @@
 #include <string>
 
 #include "hal/base/atomic_file.hpp"
+#include "proto/fingerprint.hpp"
 #include "tests/unit/calibration/sample.hpp"
 #include "tests/unit/net/raw_client.hpp"
 #include "tests/unit/net/rig.hpp"
@@ -83,7 +84,8 @@ TEST_F(UnixSocket, ServesWithoutTcp) {
 
 TEST_F(UnixSocket, NeedsNoTokenOfItsOwnUser) {
   config_.token_file = folder_.path() / "tokens";
-  base::write_file_atomically(config_.token_file, "view 0123456789abcdef\n", 0600);
+  base::write_file_atomically(config_.token_file,
+                              "view " + wire::token_hash("0123456789abcdef") + "\n", 0600);
   const Rig rig(config_);
   RawClient local{connected(path_)};
   EXPECT_EQ(local.say_hello().hello().rights(), v1::RIGHTS_CALIBRATE);
@@ -92,7 +94,8 @@ TEST_F(UnixSocket, NeedsNoTokenOfItsOwnUser) {
 TEST_F(UnixSocket, AsksOtherUsersForAToken) {
   if (::geteuid() != 0) GTEST_SKIP() << "only root can become another user";
   config_.token_file = folder_.path() / "tokens";
-  base::write_file_atomically(config_.token_file, "view 0123456789abcdef\n", 0600);
+  base::write_file_atomically(config_.token_file,
+                              "view " + wire::token_hash("0123456789abcdef") + "\n", 0600);
   fs::permissions(folder_.path(), fs::perms::others_exec, fs::perm_options::add);
   const Rig rig(config_);
   // The kernel's peer is the process that connects, whichever uses the socket later. Plain system

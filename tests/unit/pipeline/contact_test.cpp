@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <numbers>
 #include <optional>
 #include <vector>
 
@@ -31,13 +32,14 @@ class ContactTest : public ::testing::Test {
     for (int y = 0; y < kSide; ++y) {
       recon::kernels::sum_row(map.data() + std::ptrdiff_t{y} * kSide, y, 0, kSide, sums);
     }
-    return detector.inspect(sums, kSide, kSide, kMmPerPx);
+    return detector.inspect(sums, kSide, kSide, kMmPerPx, view);
   }
   bool inspect() { return summarise().in_contact; }
 
   ContactDetector detector{
       {.threshold_mm = 0.10, .release_mm = 0.05, .area_mm2 = 0.5, .debounce_frames = 2}};
   std::vector<std::int16_t> map = std::vector<std::int16_t>(kPixels, 0);
+  recon::Viewpoint view;
 };
 
 TEST_F(ContactTest, NothingPressedIsNoContact) {
@@ -60,6 +62,42 @@ TEST_F(ContactTest, SummaryIsInMillimetresFromTheCentre) {
   EXPECT_DOUBLE_EQ(summary.deepest_x_mm, 2.0);
   EXPECT_DOUBLE_EQ(summary.deepest_y_mm, 1.0);
   EXPECT_DOUBLE_EQ(summary.volume_mm3, 0.3);  // 1.2 mm × 0.25 mm²
+}
+
+// A paraboloid of 1 mm at (6, −4) mm, 6 mm wide where it is 0.1 mm deep, as a camera 25 mm above
+// (−0.5, 0.3) sees it. Its volume above 0.1 mm is that of the paraboloid's cap and of the disc
+// below.
+TEST(ContactPlace, IsTrueUnderACameraThatIsNear) {
+  constexpr int kWidth = 500;
+  constexpr int kHeight = 400;
+  constexpr double kPx = 0.0417;
+  const recon::Viewpoint view{{-0.5, 0.3}, 1.0 / 25};
+  const auto depth_at = [](recon::Point mm) {
+    return 1 - 0.1 * (std::pow(mm.x - 6, 2) + std::pow(mm.y + 4, 2));
+  };
+  ContactDetector detector({.threshold_mm = 0.10});
+  recon::DepthSums sums(detector.sum_rules());
+  for (int y = 0; y < kHeight; ++y) {
+    std::vector<std::int16_t> row;
+    for (int x = 0; x < kWidth; ++x) {
+      const recon::Point seen{(x - 0.5 * (kWidth - 1)) * kPx, (y - 0.5 * (kHeight - 1)) * kPx};
+      double depth = depth_at(seen);
+      for (int round = 0; round < 20; ++round) depth = depth_at(view.place(seen, depth));
+      row.push_back(static_cast<std::int16_t>(std::lround(1000 * std::max(0.0, depth))));
+    }
+    recon::kernels::sum_row(row.data(), y, 0, kWidth, sums);
+  }
+  const ContactSummary summary = detector.inspect(sums, kWidth, kHeight, kPx, view);
+  EXPECT_NEAR(summary.x_mm, 6, 0.012);
+  EXPECT_NEAR(summary.y_mm, -4, 0.012);
+  EXPECT_NEAR(summary.deepest_x_mm, 6, 0.06) << "to a pixel";
+  EXPECT_NEAR(summary.deepest_y_mm, -4, 0.06);
+  const double area = std::numbers::pi * 9;
+  EXPECT_NEAR(summary.area_mm2, area, 0.005 * area);
+  const double volume = 0.1 * area + 0.45 * area;
+  EXPECT_NEAR(summary.volume_mm3, volume, 0.005 * volume);
+  const ContactSummary unknown = detector.inspect(sums, kWidth, kHeight, kPx, {});
+  EXPECT_GT(unknown.x_mm, 6.08) << "as it is seen";
 }
 
 TEST_F(ContactTest, IsMadeAfterTheDebounceOnly) {
@@ -111,7 +149,7 @@ TEST_F(ContactTest, UntrustedPixelsCountForNothing) {
 
 TEST_F(ContactTest, AMapOfWhichNothingWasComputedIsNoContact) {
   const ContactSummary summary =
-      detector.inspect(recon::DepthSums(detector.sum_rules()), 580, 580, kMmPerPx);
+      detector.inspect(recon::DepthSums(detector.sum_rules()), 580, 580, kMmPerPx, {});
   EXPECT_FALSE(summary.in_contact);
   EXPECT_EQ(summary.deepest_mm, 0);
   EXPECT_EQ(summary.deepest_x_mm, 0);

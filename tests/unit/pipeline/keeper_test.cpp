@@ -103,6 +103,28 @@ TEST_F(KeeperTest, InContactAtStartUsesTheLastGoodOne) {
   EXPECT_EQ(keeper.quality(), ReferenceQuality::fresh);
 }
 
+TEST_F(KeeperTest, AfterAStartTheLastGoodOneServesUntilANewOneIsTaken) {
+  keeper.restore(fakes::toy_reference_q8({.light = 0.97}), true, true);
+  calibrate();
+  EXPECT_FALSE(run(7));
+  ASSERT_TRUE(run(1)) << "the picture has settled";
+  EXPECT_EQ(keeper.quality(), ReferenceQuality::restored);
+  EXPECT_EQ(keeper.state(), State::serving);
+  EXPECT_LT(worst_error(), 1.0);
+  EXPECT_FALSE(run(16 + 15)) << "two looks, and all but one frame of an average";
+  ASSERT_TRUE(run(1));
+  EXPECT_EQ(keeper.quality(), ReferenceQuality::fresh);
+  EXPECT_LT(worst_error(), 0.7);
+}
+
+TEST_F(KeeperTest, AfterAStartUnderAnotherLightANewReferenceIsAwaited) {
+  keeper.restore(fakes::toy_reference_q8({.light = 0.6}), false, true);
+  calibrate();
+  EXPECT_FALSE(run(23)) << "8 to settle, 15 of 16";
+  ASSERT_TRUE(run(1));
+  EXPECT_EQ(keeper.quality(), ReferenceQuality::fresh);
+}
+
 TEST_F(KeeperTest, InContactAtStartWithoutOneScalesTheCalibrations) {
   calibrate();
   scene.press_mm = 1;

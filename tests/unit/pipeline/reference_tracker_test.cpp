@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <optional>
+#include <set>
 #include <thread>
 #include <utility>
 
@@ -172,8 +173,29 @@ TEST_F(ReferenceTrackerTest, ReferencesOfOneLightAreWrittenAtMostOnceInFiveMinut
   EXPECT_NE(inode(), second);
 }
 
+// Before: a client that changed the light and re-zeroed in turn had 10 MB written in 20 s.
+TEST_F(ReferenceTrackerTest, ReferencesOfLightsThatChangeAreWrittenAtMostTwiceAMinute) {
+  ASSERT_TRUE(settles());
+  std::set<std::pair<ino_t, std::int64_t>> written;
+  const std::int64_t begin_ns = now_ns_;
+  for (int i = 0; i < 200; ++i) {
+    hal::Light light = config_.light;
+    light.brightness = i % 2 == 0 ? 128 : 200;
+    set_light(light);
+    scene_.light = i % 2 == 0 ? 0.9 : 1;
+    show(3 * kReferenceFrames);
+    struct stat about{};
+    if (::stat((folder_ / "reference.png").c_str(), &about) == 0) {
+      written.emplace(about.st_ino, about.st_mtim.tv_sec * 1'000'000'000 + about.st_mtim.tv_nsec);
+    }
+  }
+  EXPECT_GE(now_ns_ - begin_ns, 150'000'000'000);
+  EXPECT_LE(written.size(), 7U);
+}
+
 TEST_F(ReferenceTrackerTest, AReferenceOfAnotherLightIsWrittenAtOnce) {
   ASSERT_TRUE(settles());
+  now_ns_ += 30'000'000'000;
   hal::Light dim = config_.light;
   dim.brightness = 128;
   set_light(dim);

@@ -39,7 +39,9 @@ class Connecting(unittest.TestCase):
         with tempfile.TemporaryDirectory() as folder, FakeDaemon(path=f"{folder}/socket") as daemon:
             with dtact.connect(daemon.address, token="secret") as s:
                 self.assertTrue(s.same_machine)
-                self.assertEqual(s.status().state, "serving")
+                status = s.status()
+                self.assertEqual((status.state, status.fixes, status.board_celsius),
+                                 ("serving", {"light_mismatch": "Set the light back."}, 48.5))
 
     def test_a_daemon_whose_machine_is_gone_is_noticed(self):
         with FakeDaemon() as daemon, dtact.connect(daemon.address) as s:
@@ -85,9 +87,9 @@ class Connecting(unittest.TestCase):
 
     def test_a_line_of_the_daemons_list_is_no_token(self):
         with tempfile.NamedTemporaryFile("w") as file:
-            file.write("control " + 64 * "a" + " gripper\n")
+            file.write("control sha256:" + 64 * "a" + " gripper\n")
             file.flush()
-            with self.assertRaisesRegex(dtact.Error, "it is the second word"):
+            with self.assertRaisesRegex(dtact.Error, "dtactctl token -o"):
                 dtact.connect(token_file=file.name)
 
     def test_no_token_to_unauthenticated(self):

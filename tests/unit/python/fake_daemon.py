@@ -118,6 +118,9 @@ class FakeDaemon:
             elif kind == "get_status":
                 reply.status.state = 3
                 reply.status.advice = "All is well."
+                reply.status.health.append(6)
+                reply.status.fixes.append("Set the light back.")
+                reply.status.board_celsius = 48.5
                 reply.status.camera.fps = 60
                 reply.status.camera.width, reply.status.camera.height = 3, 2
                 reply.status.calibration.width = 2

@@ -108,6 +108,25 @@ class MadeOfTheDepth(unittest.TestCase):
         values[4] = 7
         self.assertFalse(dtact.Frame(frame(1, values=values, width=3).frame).points().valid.any())
 
+    def test_points_lie_where_they_are_under_a_camera_that_is_near(self):
+        # A ball of 5 mm, 1 mm deep at (5, −3), seen from 25 mm above (−0.5, 0.3).
+        surface = dtact.Surface("plane", foot_mm=(-0.5, 0.3), per_mm=1 / 25)
+        x, y = np.meshgrid((np.arange(500) - 249.5) * 0.0417, (np.arange(400) - 199.5) * 0.0417)
+        depth = np.zeros_like(x)
+        for _ in range(30):
+            u, v = surface.place(x, y, depth)
+            depth = np.maximum(0, np.sqrt(np.maximum(0, 25 - (u - 5)**2 - (v + 3)**2)) - 4)
+        um = np.round(1e3 * depth).astype(int)
+        f = dtact.Frame(frame(1, values=um.ravel().tolist(), width=500).frame)
+        f.message.depth.mm_per_px = 0.0417
+        f.message.surface.foot_x_mm, f.message.surface.foot_y_mm = surface.foot_mm
+        f.message.surface.per_mm = surface.per_mm
+        cloud = f.points()
+        pressed = um > 200
+        inwards = np.array([5e-3, -3e-3, 4e-3]) - cloud.points[pressed]
+        np.testing.assert_allclose(np.linalg.norm(inwards, axis=1), 5e-3, atol=2e-6)
+        self.assertGreater((cloud.normals[pressed] * inwards).sum(axis=1).min() / 5e-3, 0.9998)
+
     def test_points_of_a_curved_gel(self):
         f = self.frame()
         f.message.surface.shape = 1

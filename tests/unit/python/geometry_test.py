@@ -85,6 +85,22 @@ class Pose(unittest.TestCase):
         self.assertEqual(pose.unobservable.tolist(), [[0, 0, 0, 0, 1, 0]])
 
 
+class Recognition(unittest.TestCase):
+    def test_name_and_candidates(self):
+        m = message()
+        self.assertIsNone(dtact.Frame(m).recognition)
+        m.recognition.verdict, m.recognition.score, m.recognition.presses = 1, 0.9, 2
+        for name, probability in (("nut", 0.75), ("bolt", 0.125)):
+            candidate = m.recognition.candidates.add()
+            candidate.name, candidate.probability = name, probability
+        found = dtact.Frame(m).recognition
+        self.assertEqual((found.name, found.verdict, found.presses), ("nut", "known", 2))
+        self.assertEqual((found.candidates[1].name, found.candidates[1].probability), ("bolt", 0.125))
+        m.recognition.verdict = 2
+        unknown = dtact.Frame(m).recognition
+        self.assertEqual((unknown.verdict, unknown.name), ("unknown", None))
+
+
 class Asking(unittest.TestCase):
     def test_of_points_and_pose(self):
         wanted = dtact.Subscription(depth=None, cloud="int16", pose=True, cloud_hz=10)

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdlib>
 #include <memory>
 #include <random>
@@ -23,8 +24,8 @@ constexpr SumRules kRules{
     .threshold_um = 100, .release_um = 50, .bend_reach = 0, .bend_from_um = 80};
 
 auto all_of(const DepthSums& s) {
-  return std::tuple(s.made, s.um, s.um_x, s.um_y, s.lost, s.deepest_um, s.deepest_x, s.deepest_y,
-                    s.bent, s.bend_um);
+  return std::tuple(s.made, s.um, s.um_x, s.um_y, s.square, s.square_x, s.square_y, s.lost,
+                    s.deepest_um, s.deepest_x, s.deepest_y, s.bent, s.bend_um);
 }
 
 TEST(SumRow, CountsAboveTheThresholdsOnly) {
@@ -36,6 +37,9 @@ TEST(SumRow, CountsAboveTheThresholdsOnly) {
   EXPECT_EQ(sums.um, 401);
   EXPECT_EQ(sums.um_x, 3 * 101 + 4 * 300);
   EXPECT_EQ(sums.um_y, 4010);
+  EXPECT_EQ(sums.square, 1 + 11);  // 10201 and 90000 over 8192
+  EXPECT_EQ(sums.square_x, 3 * 1 + 4 * 11);
+  EXPECT_EQ(sums.square_y, 120);
   EXPECT_EQ(sums.deepest_um, 300);
   EXPECT_EQ(sums.deepest_x, 4);
   EXPECT_EQ(sums.deepest_y, 10);
@@ -145,6 +149,8 @@ TEST_P(VectorSums, TheDeepestMapOfAll) {
   EXPECT_EQ(sums.um, 16383LL * 4096);
   EXPECT_EQ(sums.um_x, 16383LL * 2 * 2047 * 1024);
   EXPECT_EQ(sums.um_y, 16383LL * 2048);
+  EXPECT_EQ(sums.square, 32764LL * 2048);
+  EXPECT_EQ(sums.square_x, 32764LL * 2047 * 1024);
 }
 
 TEST_P(VectorSums, BendsAtEveryReachAndWidth) {
@@ -181,6 +187,10 @@ DepthSums walk(const std::vector<std::int16_t>& map, const TileGrid& grid, const
         sums.um += um;
         sums.um_x += um * x;
         sums.um_y += um * y;
+        const std::int64_t square = y % 2 == 0 ? std::lround(um * um / DepthSums::kSquareUm2) : 0;
+        sums.square += square;
+        sums.square_x += square * x;
+        sums.square_y += square * y;
       }
       if (um > sums.deepest_um) {
         sums.deepest_um = static_cast<std::int16_t>(um);

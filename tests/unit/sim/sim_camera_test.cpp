@@ -233,6 +233,23 @@ TEST_F(SimCameraTest, AutomaticExposureKeepsTheMeanUntilItsFaultEnds) {
   EXPECT_NEAR(mean_grey(frame), mean_grey(fixed), 0.2);
 }
 
+TEST_F(SimCameraTest, ExposureAndGainMultiplyTheLight) {
+  SimCamera camera(config("", "luma"), link_);
+  Frame frame;
+  ASSERT_EQ(camera.grab(frame, 0s), GrabStatus::ok);
+  const double mean = mean_grey(frame);
+  camera.change({.exposure_us = 5000, .gain = {}});
+  // The next frame is exposed already.
+  for (int i = 0; i < 2; ++i) ASSERT_EQ(camera.grab(frame, 0s), GrabStatus::ok);
+  EXPECT_NEAR(mean_grey(frame), mean / 2, 1);
+  EXPECT_EQ(camera.info().controls[0].value, 500);
+  camera.change({.exposure_us = {}, .gain = 1.5});
+  for (int i = 0; i < 2; ++i) ASSERT_EQ(camera.grab(frame, 0s), GrabStatus::ok);
+  EXPECT_NEAR(mean_grey(frame), mean * 0.75, 1);
+  EXPECT_EQ(camera.info().settings.exposure_us->value, 5000);
+  EXPECT_EQ(camera.info().settings.gain->value, 1.5);
+}
+
 TEST_F(SimCameraTest, StallAndUnplugEndAndSayWhatToDo) {
   SimCamera camera(config(fault("stall", 1, 2) + fault("unplug", 4, 3), "mjpeg"), link_);
   Frame frame;

@@ -30,6 +30,45 @@ TEST(Surface, APlaneIsWhereItIsSeen) {
   expect_near(point_at({}, place).normal, {0, 0, 1});
 }
 
+TEST(Surface, WhatIsPressedLiesOnTheRay) {
+  const SurfaceModel plane{SurfaceShape::plane, 0, 25};
+  EXPECT_NEAR(unrolled(plane, {5, -3}, 1).x_mm, 4.8, 1e-12);
+  EXPECT_NEAR(unrolled(plane, {5, -3}, 1).y_mm, -2.88, 1e-12);
+  for (const SurfaceModel& surface : {kSphere, kCylinder}) {
+    const SurfacePoint point = point_at(surface, unrolled(surface, {6, -8}, 1.5));
+    const cv::Vec3d ray = point.at - 1.5 * point.normal - cv::Vec3d(0, 0, -15);
+    EXPECT_NEAR(ray[0] / ray[2], 6.0 / 15, 1e-12);
+    EXPECT_NEAR(ray[1] / ray[2], -8.0 / 15, 1e-12);
+  }
+}
+
+// A ball pressed 1 mm deep at (−8, 5) appears farther out: at depth d by 1 / (1 − d / 25).
+TEST(Surface, AnImageShowsPressedPointsFartherOut) {
+  for (const char* camera : {"camera_mm = 0.0", "camera_mm = 25.0"}) {
+    const Truth truth(small_scene(std::string("[surface]\n") + camera + R"(
+[[press]]
+object = "ball"
+radius_mm = 4.0
+keys = [ { t = 0.0, x = -8.0, y = 5.0, depth = 1.0 } ]
+)"));
+    const double height = truth.scene().surface.camera_mm;
+    std::vector<float> depth;
+    truth.indentation_mm(0, depth);
+    double worst = 0;
+    for (int row = 0; row < 120; ++row) {
+      for (int column = 0; column < 160; ++column) {
+        const double d = depth[pixel(column, row)];
+        if (d < 0.5) continue;
+        const double rest = height > 0 ? 1 - d / height : 1;
+        const double x = (column - 79.5) * 0.2 * rest + 8;
+        const double y = (row - 59.5) * 0.2 * rest - 5;
+        worst = std::max(worst, std::abs(d - (std::sqrt(16 - x * x - y * y) - 3)));
+      }
+    }
+    EXPECT_LT(worst, 0.009) << camera << ": the grid is coarse";
+  }
+}
+
 TEST(Surface, TheApexIsTheOrigin) {
   for (const SurfaceModel& surface : {kSphere, kCylinder}) {
     EXPECT_EQ(unrolled(surface, {}).x_mm, 0);

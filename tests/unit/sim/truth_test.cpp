@@ -52,7 +52,8 @@ TEST(Truth, IsABallInTheContactAndBulgesOutside) {
     for (int x = 0; x < 160; ++x) {
       const auto i = pixel(x, y);
       lowest = std::min(lowest, map[i]);
-      const double r = std::hypot(x - 79.5, y - 59.5) * 0.2;
+      // The camera is 28 mm above.
+      const double r = std::hypot(x - 79.5, y - 59.5) * 0.2 * (1 - double{map[i]} / 28);
       if (contact[i] == 255 && r < 2) {
         ++in_contact;
         // Sphere of radius 4, 1 mm deep; 0.006 for straight lines between points 0.25 mm apart.

@@ -33,7 +33,7 @@ ROOMS = {
     "daemon/serve": ["hal/base", "proto"],
     "daemon/net": ["daemon/serve", "hal", "hal/base", "hal/files", "proto", "daemon/pipeline", "daemon/calibration", "daemon/recon"],
     # Metrics are text of the network part's overview; only the assembly includes it.
-    "daemon/metrics": ["daemon/net"],
+    "daemon/metrics": ["hal/base", "daemon/net"],
     "daemon/announce": ["hal/base", "proto"],
     "daemon/app/doctor": ["hal", "hal/base", "hal/gpiod", "hal/v4l2", "hal/ws2812"],
     "daemon/app": ["hal", "hal/base", "hal/files", "daemon/calibration", "daemon/pipeline", "daemon/serve", "daemon/net", "daemon/metrics", "daemon/announce"],
@@ -43,6 +43,7 @@ ROOMS = {
     # Only the surface's shape from the reconstruction.
     "clients/geometry": ["daemon/recon"],
     "clients/perceive/pose": ["clients/geometry"],
+    "clients/perceive/recognition": ["clients/geometry", "hal/base", "hal/files", "proto"],
     "clients/common": ["daemon/serve", "hal/base", "hal/files", "proto", "daemon/recon", "clients/cpp", "clients/geometry"],
     "clients/recording": ["hal/files", "proto", "clients/cpp"],
     "clients/calibrate/fit": ["hal/files", "daemon/recon", "daemon/calibration"],
@@ -54,12 +55,15 @@ ROOMS = {
     "clients/calibrate/reprocess": ["hal", "hal/base", "hal/files", "hal/luma", "hal/mjpeg", "proto", "daemon/calibration", "daemon/pipeline/reference", "daemon/pipeline/depth", "clients/common", "clients/recording"],
     # Contacts of pictures and of recordings.
     "clients/calibrate/force": ["hal/base", "hal/files", "daemon/recon", "daemon/calibration", "clients/common", "clients/cpp", "clients/calibrate/offline", "clients/recording"],
-    "clients/calibrate": ["clients/common", "clients/calibrate/force", "clients/calibrate/guided", "clients/calibrate/offline", "clients/calibrate/reprocess"],
+    "clients/calibrate/objects": ["hal/base", "hal/files", "clients/calibrate/guided", "clients/calibrate/offline", "clients/recording", "clients/common", "clients/cpp", "clients/geometry", "clients/perceive/recognition"],
+    "clients/calibrate": ["clients/common", "clients/calibrate/force", "clients/calibrate/guided", "clients/calibrate/objects", "clients/calibrate/offline", "clients/calibrate/reprocess"],
     # A client and a server: it serves the wire with the daemon's own code.
-    "clients/perceive": ["hal/base", "proto", "daemon/recon", "daemon/serve", "clients/common", "clients/cpp", "clients/geometry", "clients/perceive/pose"],
+    "clients/perceive": ["hal/base", "proto", "daemon/recon", "daemon/serve", "clients/common", "clients/cpp", "clients/geometry", "clients/perceive/pose", "clients/perceive/recognition"],
     # The same for browsers.
-    "clients/web/foxglove": ["proto", "daemon/serve", "clients/cpp", "clients/common", "clients/recording", "clients/web"],
+    "clients/web/foxglove": ["hal/base", "proto", "daemon/serve", "clients/cpp", "clients/common", "clients/recording", "clients/web"],
     "clients/web": ["hal/base", "proto", "daemon/serve", "clients/common", "clients/cpp", "clients/web/foxglove"],
+    # Converts frames and passes commands on.
+    "clients/dds": ["hal/files", "daemon/serve", "daemon/recon", "proto", "clients/common", "clients/cpp", "clients/geometry", "clients/recording"],
     # Administers a daemon: neither a fit nor OpenCV.
     "clients/ctl": ["hal/base", "hal/files", "hal/v4l2", "proto", "clients/common", "clients/cpp", "clients/recording"],
 }

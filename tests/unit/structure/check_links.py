@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Checks what the programs link: check_links.py DTACTD DTACTCTL DTACT_CALIBRATE DTACT_PERCEIVE DTACT_WEB
+"""Checks what the programs link: check_links.py DTACTD DTACTCTL DTACT_CALIBRATE DTACT_PERCEIVE DTACT_WEB DTACT_DDS
 
 The libraries named by the program itself count (DT_NEEDED), not what those bring along.
 """
@@ -17,13 +17,16 @@ RULES = {
     # D-Bus. Highway it may: it writes point clouds.
     "dtactctl": ([], ["gpiod", "camera", "spdlog"],
                  FITS + ["dtact::calibration::load", "dtact::recon::Reconstructor::run"]),
-    "dtact-calibrate": (["core", "imgproc", "calib3d"],
+    "dtact-calibrate": (["core", "imgproc", "calib3d", "dnn"],
                         ["systemd", "gpiod", "camera", "spdlog"], []),
-    # It receives depth.
-    "dtact-perceive": ([], ["tomlplusplus", "systemd", "gpiod", "camera", "spdlog"],
+    # It receives depth; the recognition runs a network.
+    "dtact-perceive": (["core", "dnn"], ["tomlplusplus", "systemd", "gpiod", "camera", "spdlog"],
                        FITS + ["dtact::calibration::load", "dtact::recon::Reconstructor::run"]),
-    # It only forwards.
-    "dtact-web": ([], ["tomlplusplus", "systemd", "gpiod", "camera", "spdlog"],
+    # It only forwards, and asks Avahi over D-Bus.
+    "dtact-web": ([], ["tomlplusplus", "gpiod", "camera", "spdlog"],
+                  FITS + ["dtact::calibration::load", "dtact::recon::Reconstructor::run"]),
+    # It receives depth, and asks Avahi over D-Bus.
+    "dtact-dds": ([], ["tomlplusplus", "gpiod", "camera", "spdlog"],
                   FITS + ["dtact::calibration::load", "dtact::recon::Reconstructor::run"]),
 }
 

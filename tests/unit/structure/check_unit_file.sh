@@ -16,14 +16,14 @@ verify() {
   grep -F dtact <<<"$output" || true
 }
 
-built() { sed -E "s#/usr/bin/dtact(d|-perceive|-web)#$program#"; }
+built() { sed -E "s#/usr/bin/dtact(d|-dds|-perceive|-web)#$program#"; }
 
-for unit in dtactd.service dtactd@.service dtact-perceive.service dtact-web.service; do
+for unit in dtactd.service dtactd@.service dtact-dds.service dtact-perceive.service dtact-web.service; do
   built <"$source/$unit" >"$folder/$unit"
   complaint=$(verify "$unit")
   [[ -z $complaint ]] || fail "$complaint"
-  # In tenths: 1.5. What is left is what the sensor needs: its devices, FIFO, the network.
-  systemd-analyze security --offline=true --no-pager --threshold=15 "$folder/$unit" >"$folder/score" ||
+  # In tenths: 1.3. What is left is what the sensor needs: its devices, FIFO, the network.
+  systemd-analyze security --offline=true --no-pager --threshold=13 "$folder/$unit" >"$folder/score" ||
     fail "$unit is too exposed: $(grep -v '^✓' "$folder/score")"
   tail -n 1 "$folder/score"
   grep -qx 'StartLimitIntervalSec=0' "$source/$unit" || fail "$unit gives up after five failures"
@@ -45,7 +45,7 @@ for unit in dtactd.service dtactd@.service; do
 done
 
 # The drop-in that a comment shows, with which a token reaches the service's own user.
-for unit in dtact-perceive.service dtact-web.service; do
+for unit in dtact-dds.service dtact-perceive.service dtact-web.service; do
   mkdir "$folder/$unit.d"
   sed -n 's/^#   //p' "$source/$unit" | built >"$folder/$unit.d/token.conf"
   grep -q '^LoadCredential=token:' "$folder/$unit.d/token.conf" || fail "$unit does not say how it gets a token"

@@ -2,8 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <stdexcept>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -243,6 +245,45 @@ TEST(V4l2Camera, ADriverWithoutRatesIsTakenAtItsWord) {
   device.deliver_grey(1, 0);
   Frame frame;
   EXPECT_EQ(camera.grab(frame, milliseconds(1000)), GrabStatus::ok);
+}
+
+// The emulated camera counts its exposure in 100 us, 1 to 1000 of them.
+TEST(V4l2Camera, ChangesItsExposureAndKeepsItAcrossAReplug) {
+  EmulatedCamera device;
+  V4l2Camera camera(small());
+  EXPECT_THROW(camera.change({.exposure_us = 4170, .gain = {}}),
+               std::runtime_error);  // not there yet
+  camera.start();
+  const CameraSettings before = camera.info().settings;
+  ASSERT_TRUE(before.exposure_us && before.gain);
+  EXPECT_EQ(before.exposure_us->value, 15600);
+  EXPECT_EQ(before.exposure_us->minimum, 100);
+  EXPECT_EQ(before.exposure_us->maximum, 100000);
+  EXPECT_EQ(before.gain->maximum, 100);
+  camera.change({.exposure_us = 4170, .gain = {}});
+  EXPECT_EQ(device.control(V4L2_CID_EXPOSURE_ABSOLUTE), 42);
+  EXPECT_EQ(device.control(V4L2_CID_GAIN), 5);
+  EXPECT_EQ(camera.info().settings.exposure_us->value, 4200);
+  const auto controls = camera.info().controls;
+  const auto entry = std::ranges::find(controls, "exposure_time_absolute", &CameraControl::name);
+  ASSERT_NE(entry, controls.end());
+  EXPECT_EQ(entry->value, 42);
+  // The watching thread looks every second, and does not set it back.
+  std::this_thread::sleep_for(milliseconds(1500));
+  EXPECT_EQ(device.control(V4L2_CID_EXPOSURE_ABSOLUTE), 42);
+  EXPECT_EQ(camera.report().moved, "");
+
+  device.fail(VIDIOC_DQBUF, ENODEV, 1);
+  Frame frame;
+  (void)camera.grab(frame, milliseconds(10));
+  device.deliver_grey(7, 0);
+  ASSERT_EQ(grab_soon(camera, frame), GrabStatus::ok);
+  EXPECT_EQ(device.control(V4L2_CID_EXPOSURE_ABSOLUTE), 42);
+  EXPECT_EQ(camera.info().settings.exposure_us->value, 4200);
+
+  device.refuse(V4L2_CID_EXPOSURE_ABSOLUTE);
+  EXPECT_THROW(camera.change({.exposure_us = 8300, .gain = {}}), std::runtime_error);
+  EXPECT_EQ(camera.info().settings.exposure_us->value, 4200);
 }
 
 }  // namespace

@@ -1,5 +1,5 @@
 // The values that --daemon accepts.
-#include "clients/web/daemon_option.hpp"
+#include "clients/common/daemon_option.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -9,9 +9,11 @@
 namespace dtact::web {
 namespace {
 
+using cli::parse_daemons;
+
 std::string complaint(const std::string& text) {
   try {
-    (void)parse_daemon(text, {});
+    (void)parse_daemons("--daemon", {text}, {});
   } catch (const std::exception& e) {
     return e.what();
   }
@@ -23,7 +25,8 @@ TEST(DaemonOption, NameAndAddress) {
   common.port = 7399;
   common.token = "of --host alone";
   common.insecure = true;
-  const NamedDaemon made = parse_daemon("left-1=unix:/run/x=y.sock", common);
+  const cli::NamedDaemon made =
+      parse_daemons("--daemon", {"left-1=unix:/run/x=y.sock"}, common).front();
   EXPECT_EQ(made.name, "left-1");
   EXPECT_EQ(made.options.host, "unix:/run/x=y.sock");
   EXPECT_EQ(made.options.port, 7399);
@@ -33,8 +36,9 @@ TEST(DaemonOption, NameAndAddress) {
 }
 
 TEST(DaemonOption, ProofOfWhoItIs) {
-  const NamedDaemon made =
-      parse_daemon("a=gripper:7377,fingerprint=3f00,ca-file=/ca.pem,insecure", {});
+  const cli::NamedDaemon made =
+      parse_daemons("--daemon", {"a=gripper:7377,fingerprint=3f00,ca-file=/ca.pem,insecure"}, {})
+          .front();
   EXPECT_EQ(made.options.host, "gripper:7377");
   ASSERT_TRUE(made.options.tls);
   EXPECT_EQ(made.options.tls->fingerprint, "3f00");
@@ -51,6 +55,7 @@ TEST(DaemonOption, NamesWhatMakesNoSense) {
   EXPECT_THAT(complaint(std::string(65, 'a') + "=gripper"), HasSubstr("1 to 64"));
   EXPECT_THAT(complaint("a=b,colour=red"), HasSubstr("\"colour=red\" is not known"));
   EXPECT_THAT(complaint("a=b,fingerprint"), HasSubstr("\"fingerprint\" is not known"));
+  EXPECT_THROW((void)parse_daemons("--daemon", {"a=b", "a=c"}, {}), std::runtime_error);
   EXPECT_THAT(complaint("a=b,token-file=/nowhere"), HasSubstr("/nowhere"));
 }
 

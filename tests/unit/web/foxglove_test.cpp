@@ -50,7 +50,7 @@ TEST(FoxgloveProtocol, RequestAndResponseHaveSchemasOfTheirOwn) {
 TEST(FoxgloveProtocol, IdsAreAlikeForNoTwo) {
   EXPECT_EQ(channel_id(0, Topic::frame), 1U);
   EXPECT_EQ(channel_id(0, Topic::jpeg), 8U);
-  EXPECT_EQ(channel_id(1, Topic::frame), 12U);
+  EXPECT_EQ(channel_id(1, Topic::frame), 13U);
   EXPECT_EQ(service_id(0, Service::rezero), 2U);
   EXPECT_EQ(service_id(1, Service::set_light), 3U);
   for (std::size_t i = 0; i < kTopics; ++i) EXPECT_EQ(index(topics()[i].topic), i);
@@ -221,6 +221,15 @@ TEST(FoxgloveTopics, ThePoseOfTheObject) {
   EXPECT_EQ(in_frame.pose().orientation().w(), 1);
 }
 
+TEST(FoxgloveTopics, WhatTheObjectIs) {
+  v1::Frame frame;
+  EXPECT_EQ(message_of(Topic::recognition, frame), nullptr);
+  frame.mutable_recognition()->set_verdict(v1::Recognition::UNKNOWN);
+  v1::Recognition recognition;
+  ASSERT_TRUE(recognition.ParseFromString(message_of(Topic::recognition, frame)->payload));
+  EXPECT_EQ(recognition.verdict(), v1::Recognition::UNKNOWN);
+}
+
 void collect_strings(const google::protobuf::Value& value, std::vector<std::string>& all) {
   if (value.has_string_value()) all.push_back(value.string_value());
   for (const auto& one : value.list_value().values()) collect_strings(one, all);
@@ -257,20 +266,22 @@ TEST(FoxgloveLayouts, HaveTitlesForBothProgramsAndTopicsThatAreServed) {
 }
 
 TEST(FoxgloveTopics, AreThoseThatTheDaemonServes) {
-  EXPECT_EQ(served_by(std::nullopt).count(), kTopics - 3);
+  EXPECT_EQ(served_by(std::nullopt).count(), kTopics - 4);
   EXPECT_FALSE(served_by(v1::HelloReply()).test(index(Topic::points)));
   v1::HelloReply perceive;
   perceive.add_features("cloud");
-  EXPECT_EQ(served_by(perceive).count(), 5U);
+  EXPECT_EQ(served_by(perceive).count(), 6U);
   EXPECT_TRUE(served_by(perceive).test(index(Topic::points)));
   Topics wanted;
   wanted.set(index(Topic::points));
   EXPECT_EQ(subscription_for(wanted).ShortDebugString(),
             "summary: true summary_hz: 60 decimation: 2 contact_box: true cloud: CLOUD_FLOAT32 "
             "cloud_hz: 60");
-  EXPECT_EQ(unadvertise({{1, "/left", wanted}}), R"({"op":"unadvertise","channelIds":[20]})");
+  EXPECT_EQ(unadvertise({{1, "/left", wanted}}), R"({"op":"unadvertise","channelIds":[21]})");
   wanted.reset().set(index(Topic::transforms));
   EXPECT_EQ(subscription_for(wanted).ShortDebugString(), "pose: true pose_hz: 60");
+  wanted.reset().set(index(Topic::recognition));
+  EXPECT_EQ(subscription_for(wanted).ShortDebugString(), "recognition: true recognition_hz: 60");
 }
 
 TEST(FoxgloveEndpoint, ATokenInTheAddress) {

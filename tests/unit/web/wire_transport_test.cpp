@@ -40,7 +40,7 @@ class FakeSocket : public WebSocket {
 
 struct Rig {
   std::shared_ptr<FakeSocket> socket = std::make_shared<FakeSocket>();
-  WireTransport transport{socket, {}};
+  WireTransport transport{socket, {}, {}};
   int done = 0;
 
   void write(const std::string& bytes) {
@@ -61,6 +61,15 @@ TEST(WireTransport, ATextGoesAtOnceWhenNothingIsWritten) {
   EXPECT_THAT(rig.socket->written, ElementsAre("text:a", "1"));
   rig.socket->finish();
   EXPECT_EQ(rig.done, 1);
+}
+
+TEST(WireTransport, KeepsItsPlaceUntilThePeerIsAuthenticated) {
+  auto place = std::make_shared<int>();
+  const std::weak_ptr<int> kept = place;
+  WireTransport transport(std::make_shared<FakeSocket>(), {}, std::move(place));
+  EXPECT_FALSE(kept.expired());
+  transport.on_authenticated();
+  EXPECT_TRUE(kept.expired());
 }
 
 TEST(WireTransport, OfTextsThatWaitTheNewestGoes) {
@@ -89,7 +98,7 @@ TEST(WireTransport, ClientsSendNoTexts) {
 TEST(WireTransport, ATextMayOutliveIt) {
   const auto socket = std::make_shared<FakeSocket>();
   {
-    WireTransport transport(socket, {});
+    WireTransport transport(socket, {}, {});
     transport.send_text("a");
   }
   socket->finish();
