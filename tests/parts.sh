@@ -4,9 +4,10 @@
 
 # part NAME COMMAND...: runs a part of the tests and prints its time.
 # The others run after a failed part, and end_of_parts fails for it. A part that passed is
-# recorded in build/passed with a digest of the tree, so that --resume need not repeat it. A part that cannot
-# run on this machine ends with $skipped.
+# recorded in build/passed with a digest of the files that it reads, so that --resume need not repeat it: all
+# but those that $unread names. A part that cannot run on this machine ends with $skipped.
 skipped=77
+unread=()
 failed_parts=()
 skipped_parts=()
 resume=0
@@ -15,7 +16,7 @@ part() {
   shift
   tree=$(tree_digest)
   if ((resume)) && [[ -e $passed && $(<"$passed") == "$tree" ]]; then
-    echo "dev: $name passed on this very tree before"
+    echo "dev: $name passed on these very files before"
     return
   fi
   # In `( … ) || …` the shell would continue after a command that fails inside.
@@ -37,10 +38,11 @@ part() {
   echo "dev: $name took $((SECONDS - began)) s$verdict"
 }
 
-# A digest of every file of the tree as git sees it, including uncommitted changes, but without the page of
-# the tests' measurements.
+# A digest of the files of the tree as git sees it, including uncommitted changes, but without those that
+# $unread names and the page of the tests' measurements.
 tree_digest() {
-  git ls-files -z --cached --others --exclude-standard -- . ':!tests/MEASURED.md' | { xargs -0 sha256sum 2>&1 || true; } | sha256sum
+  git ls-files -z --cached --others --exclude-standard -- . "${unread[@]/#/:!}" ':!tests/MEASURED.md' \
+    | { xargs -0 sha256sum 2>&1 || true; } | sha256sum
 }
 
 end_of_parts() {
@@ -54,8 +56,14 @@ test_dev() {
   build_preset dev
   # A guest waits for much of its time: one test more than processors. Daemons have to keep pace with
   # the camera, so nothing that computes for minutes runs beside them.
-  ctest --test-dir build/dev --output-on-failure -LE e2e -j"$(($(nproc) + 1))"
+  ctest --test-dir build/dev --output-on-failure -LE 'e2e|long' -j"$(($(nproc) + 1))"
   ctest --test-dir build/dev --output-on-failure -L e2e -j"$(nproc)"
+}
+
+# Accuracy tests of a minute and more.
+test_long() {
+  build_preset dev
+  ctest --test-dir build/dev --output-on-failure -L long -j"$(nproc)"
 }
 
 # The unit tests and the checks of the structure, for the time between two edits.
@@ -70,12 +78,25 @@ check_format() {
     tests/install/guest/{dtact-test,initrd-init}
 }
 
-# test_sanitized PRESET LABELS TESTS: all tests except those with these labels or names.
-test_sanitized() {
-  build_preset "$1" hal/all daemon/all clients/all tests/{unit,fuzz,e2e,soak}/all bench_tests
-  # An end-to-end test has the machine for itself; the unit tests' deadlines tolerate others.
-  ctest --test-dir "build/$1" --output-on-failure -L unit -E "$3" -j"$(nproc)"
-  ctest --test-dir "build/$1" --output-on-failure -LE "unit|$2" -E "$3"
+# All tests but those without code of their own: an end-to-end test's deadlines do not hold with two at a
+# time, and the accuracy tests run the code of the unit tests on more images, longer than all others together.
+# The guest kernel has no memory for the sanitizers' shadows.
+test_addresses() {
+  build_preset asan-ubsan hal/all daemon/all clients/all tests/{unit,fuzz,e2e,soak}/all bench_tests
+  ctest --test-dir build/asan-ubsan --output-on-failure -L unit -E '^python_test$' -j"$(nproc)"
+  ctest --test-dir build/asan-ubsan --output-on-failure -LE 'unit|kernel|accuracy|web'
+}
+
+# The tests of what has more than one thread. A live session is too slow. Under this sanitizer protobuf's maps
+# have another layout than in Debian's library, so code that reads Foxglove's JSON cannot run.
+test_threads() {
+  local unit=({announce,app,base,client,ctl,live,metrics,net,net_security,perceive}_test
+    pipeline_{parts_,heartbeat_,malloc_,}test sim_camera_test v4l2_test ws2812_test)
+  local whole=(e2e_{calibration,clients,exposure,hostile,metrics,perceive,record,reload,secure,stream,watchdog}_test)
+  local names="${unit[*]} ${whole[*]} e2e_gateway"
+  build_preset tsan daemon/all clients/all "${unit[@]}" "${whole[@]}"
+  ctest --test-dir build/tsan --output-on-failure -L unit -R "^(${names// /|})\$" -j"$(nproc)"
+  ctest --test-dir build/tsan --output-on-failure -L e2e -R "^(${names// /|})\$"
 }
 
 # Packages as users get them, and the same bytes from another place.
@@ -116,20 +137,19 @@ run_tests() {
   fi
 
   need "${all_packages[@]}"
+  part 'the long accuracy tests' test_long
   part 'the format' check_format
   # Nothing is compiled: clang-tidy reads what the dev build was compiled with.
   part clang-tidy tests/tidy.py build/dev
-  # The guest kernel has no memory for the sanitizers' shadows. The accuracy tests run the code of the
-  # unit tests on more images and take longer than all others together.
-  part 'the address and undefined-behaviour sanitizers' test_sanitized asan-ubsan 'kernel|accuracy|web' '^python_test$'
-  # The excluded ones have one thread; a live session is too slow. Under the thread sanitizer protobuf's maps
-  # have another layout than in Debian's library, so code that reads Foxglove's JSON cannot run.
-  part 'the thread sanitizer' test_sanitized tsan 'kernel|accuracy|live' \
-    '^((recon|calibration|offline|lens_calibration|sim_parts|luma|mjpeg|wire|python|web)_test|e2e_foxglove|fuzz_web)$'
+  unread=('*.md' tests/{accuracy,install,kernel,packages,platform,recognition,web})
+  part 'the address and undefined-behaviour sanitizers' test_addresses
+  part 'the thread sanitizer' test_threads
+  unread=('*.md' tests/{install,kernel,web})
   part 'the packages, built twice' test_compiled_packages
   part 'Debian 13' test_platform debian13
   part arm64 test_platform arm64
   part "Debian 13's packages for arm64" run_package --debian 13 --arch arm64
+  unread=('*.md' tests/{accuracy,bench,e2e,fuzz,recognition,soak,unit,web})
   # From the packages of the part above: users install these, not the dev build's.
   part 'installation, faults and power cuts' test_installed --all --cuts 20 --packages build/packages
   # From the packages of the part "Debian 13".

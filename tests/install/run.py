@@ -26,7 +26,7 @@ SHORT = ('install', 'purge')
 ALL = ('install', 'restart', 'hung_camera', 'broken_configuration', 'reload', 'state_disc', 'clock',
        'two_sensors', 'outside', 'credentials', 'devices', 'upgrade', 'purge')
 # Cases that differ on another processor's programs or kernel; the others would only repeat.
-EMULATED = ('install', 'restart', 'broken_configuration', 'reload', 'purge')
+EMULATED = ('install', 'restart', 'purge')
 
 
 def job_folder(folder: Path, debs: Path, emulated: bool) -> Path:
