@@ -91,6 +91,17 @@ int get_counted(int fd, std::uint32_t id, const fs::path& usb_device, std::int64
   return error;
 }
 
+/// The value nearest to `value` that the control has. The kernel rounds in the same way and without
+/// an error, so another value would be refused when it is read back. lock() refuses values outside
+/// the range.
+std::int64_t nearest(const v4l2_queryctrl& offered, std::int64_t value) {
+  if (value < offered.minimum || value > offered.maximum) return value;
+  const std::int64_t step = std::max<std::int64_t>(1, offered.step);
+  const std::int64_t steps = (value - offered.minimum + step / 2) / step;
+  const std::int64_t rounded = offered.minimum + steps * step;
+  return rounded > offered.maximum ? rounded - step : rounded;
+}
+
 /// Sets one control and reads it back.
 LockedControl lock(int fd, const Control& control, const v4l2_queryctrl& offered,
                    std::int64_t value, const fs::path& usb_device) {
@@ -247,6 +258,7 @@ CameraSettings PhotometricLock::settings(int fd, const std::vector<CameraControl
 
 void PhotometricLock::change(int fd, const CameraChange& change,
                              std::vector<CameraControl>& controls) {
+  const std::vector<CameraControl> before = controls;
   const auto set_one = [&](const char* name, const std::optional<double>& value, double unit) {
     if (!value) return;
     const auto now = std::ranges::find(controls, name, &CameraControl::name);
@@ -255,12 +267,26 @@ void PhotometricLock::change(int fd, const CameraChange& change,
       throw std::runtime_error(fmt::format("this camera has no {}", name));
     }
     // Not the count of transfers, among which are the stream's.
-    CameraControl set = lock(fd, *find(name), *offered, std::llround(*value / unit), {}).control;
+    const std::int64_t asked = nearest(*offered, std::llround(*value / unit));
+    CameraControl set = lock(fd, *find(name), *offered, asked, {}).control;
     if (set.verdict == ControlVerdict::refused) throw std::runtime_error(set.note);
     *now = std::move(set);
   };
-  set_one(kExposure, change.exposure_us, kExposureUnitUs);
-  set_one(kGain, change.gain, 1);
+  const auto set_back = [&](const char* name, const std::optional<double>& value) {
+    const auto then = std::ranges::find(before, name, &CameraControl::name);
+    if (value && then != before.end()) (void)set(fd, find(name)->id, then->value);
+  };
+  try {
+    set_one(kExposure, change.exposure_us, kExposureUnitUs);
+    set_one(kGain, change.gain, 1);
+  } catch (const std::runtime_error&) {
+    // The caller reports what was before. A control left at another value would be set back later
+    // by check(), as one that moved by itself.
+    controls = before;
+    set_back(kExposure, change.exposure_us);
+    set_back(kGain, change.gain);
+    throw;
+  }
 }
 
 }  // namespace dtact::hal::v4l2

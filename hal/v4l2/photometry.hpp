@@ -65,7 +65,8 @@ class PhotometricLock {
 
   /// Exposure and gain of the device at `fd`, as far as it has them.
   [[nodiscard]] static CameraSettings settings(int fd, const std::vector<CameraControl>& controls);
-  /// Sets what `change` has, and its entries of `controls`. Throws std::runtime_error.
+  /// Sets what `change` has to the nearest values of the controls, and its entries of `controls`.
+  /// When the camera refuses one, sets all back and throws std::runtime_error.
   static void change(int fd, const CameraChange& change, std::vector<CameraControl>& controls);
 
  private:

@@ -142,6 +142,11 @@ void EmulatedCamera::refuse(std::uint32_t id) {
   controls_.at(id).refused = true;
 }
 
+void EmulatedCamera::set_step(std::uint32_t id, std::int32_t step) {
+  const std::lock_guard guard(mutex_);
+  controls_.at(id).step = step;
+}
+
 void EmulatedCamera::count_transfer() const {
   const std::string path = root_ + "/sys/devices/usb/1-1/urbnum";
   std::uint64_t count = 0;
@@ -257,7 +262,7 @@ int EmulatedCamera::answer(unsigned long request, std::vector<std::uint8_t>& arg
       if (it == controls_.end()) return EINVAL;
       query.minimum = it->second.minimum;
       query.maximum = it->second.maximum;
-      query.step = 1;
+      query.step = it->second.step;
       query.default_value = it->second.initial;
       return 0;
     }
@@ -271,10 +276,13 @@ int EmulatedCamera::answer(unsigned long request, std::vector<std::uint8_t>& arg
       return 0;
     }
     case VIDIOC_S_CTRL: {
-      const auto& control = as<v4l2_control>(argument);
+      auto& control = as<v4l2_control>(argument);
       Control& known = controls_.at(control.id);
       count_transfer();
       if (known.refused) return EIO;
+      // ROUND_TO_RANGE() in drivers/media/v4l2-core/v4l2-ctrls-core.c.
+      control.value = std::clamp(control.value + known.step / 2, known.minimum, known.maximum);
+      control.value -= (control.value - known.minimum) % known.step;
       if (!known.ignored) known.value = control.value;
       if (known.copy) known.copy = control.value;
       return 0;

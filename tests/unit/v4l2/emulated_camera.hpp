@@ -57,6 +57,8 @@ class EmulatedCamera {
   /// Accepts every value without an error and keeps its own.
   void ignore(std::uint32_t id);
   void refuse(std::uint32_t id);
+  /// Rounds values to whole steps from its minimum, as the kernel does.
+  void set_step(std::uint32_t id, std::int32_t step);
   [[nodiscard]] std::int32_t control(std::uint32_t id) const;
   [[nodiscard]] bool streaming() const;
 
@@ -67,6 +69,7 @@ class EmulatedCamera {
     bool copied = false;
     std::optional<std::int32_t> copy = {};
     bool ignored = false, refused = false;
+    std::int32_t step = 1;
   };
   void count_transfer() const;
   static gboolean on_ioctl(UMockdevIoctlBase*, UMockdevIoctlClient* client, gpointer self);

@@ -217,6 +217,50 @@ TEST(PhotometricLock, FindsAndSetsBackWhatMoved) {
   EXPECT_EQ(lock.check(fd.get(), controls), "");
 }
 
+TEST(PhotometricLock, ChangesToTheNearestStep) {
+  EmulatedCamera device;
+  const base::UniqueFd fd = open_camera();
+  auto controls = applied({}, fd.get());
+  device.set_step(V4L2_CID_EXPOSURE_ABSOLUTE, 10);  // 1, 11, ... 991
+  struct Row {
+    double asked_us;
+    std::int64_t value;
+  };
+  for (const Row row : {Row{20000, 201}, Row{20700, 211}, Row{100, 1}, Row{100000, 991}}) {
+    PhotometricLock::change(fd.get(), {.exposure_us = row.asked_us, .gain = {}}, controls);
+    EXPECT_EQ(device.control(V4L2_CID_EXPOSURE_ABSOLUTE), row.value);
+    EXPECT_EQ(controls[3].value, row.value);
+    EXPECT_EQ(controls[3].verdict, ControlVerdict::accepted);
+  }
+  EXPECT_THROW(PhotometricLock::change(fd.get(), {.exposure_us = 100100, .gain = {}}, controls),
+               std::runtime_error);
+  EXPECT_EQ(device.control(V4L2_CID_EXPOSURE_ABSOLUTE), 991);
+}
+
+// Else check() would set it back later, as a control that moved by itself.
+TEST(PhotometricLock, AFailedChangeLeavesEverythingAsItWas) {
+  EmulatedCamera device;
+  const base::UniqueFd fd = open_camera();
+  const PhotometricLock lock(V4l2Config{});
+  auto controls = applied({}, fd.get());
+  const auto expect_unchanged = [&] {
+    EXPECT_EQ(device.control(V4L2_CID_EXPOSURE_ABSOLUTE), 156);
+    EXPECT_EQ(device.control(V4L2_CID_GAIN), 5);
+    EXPECT_EQ(controls[3].value, 156);
+    EXPECT_EQ(controls[3].verdict, ControlVerdict::confirmed);
+    EXPECT_EQ(controls[4].value, 5);
+    EXPECT_EQ(lock.check(fd.get(), controls), "");
+  };
+  device.fail(VIDIOC_G_CTRL, EIO, 1);
+  EXPECT_THROW(PhotometricLock::change(fd.get(), {.exposure_us = 20000, .gain = 7}, controls),
+               std::runtime_error);
+  expect_unchanged();
+  device.refuse(V4L2_CID_GAIN);
+  EXPECT_THROW(PhotometricLock::change(fd.get(), {.exposure_us = 20000, .gain = 7}, controls),
+               std::runtime_error);
+  expect_unchanged();
+}
+
 TEST(ListControls, SaysRangesAndValues) {
   const EmulatedCamera device;
   const base::UniqueFd fd = open_camera();
