@@ -29,6 +29,8 @@ constexpr const char* kGain = "analogue_gain";
 /// Asked for as FrameDurationLimits, read as FrameDuration.
 constexpr const char* kFrameDuration = "frame_duration";
 
+constexpr const char* kNotSaidYet = "set; the frames have not said yet what came of it";
+
 /// Microseconds. The initial value of a Pi's cameras without a request (ipa_base.cpp:
 /// defaultExposureTime); their list of controls has no default.
 constexpr double kDefaultExposure = 20000;
@@ -208,7 +210,7 @@ PhotometricLock::RequestedControls PhotometricLock::requested_controls(
       requested_controls.list.set(control.id.id(), value_of(control.id.type(), *value));
       entry.value = report_value(control.id, *value);
       entry.verdict = ControlVerdict::accepted;
-      entry.note = "set; the frames have not said yet what came of it";
+      entry.note = kNotSaidYet;
     }
     requested_controls.controls.push_back(std::move(entry));
   }
@@ -259,6 +261,7 @@ lc::ControlList PhotometricLock::changed_controls(const CameraChange& change,
     if (entry == controls.end()) return;
     entry->value = report_value(id, *value);
     entry->verdict = ControlVerdict::accepted;
+    entry->note = kNotSaidYet;
   };
   set_one(kExposure, change.exposure_us);
   set_one(kGain, change.gain);

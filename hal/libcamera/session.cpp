@@ -59,9 +59,10 @@ int orientation_of(const Configuration& configuration) {
   }
 }
 
-/// Until what was set at the start shows in the frames: a sensor takes two to three, before which
-/// the buffers of the queue are filled.
-constexpr int kSettlingFrames = 16;
+/// Opening may be the capture thread's work, for which the watchdog waits ten seconds. The two
+/// limits add up when a camera that is opened anew is changed as the one before was.
+constexpr double kMaxSettlingNs = 4e9;
+constexpr double kMaxChangingNs = 2e9;
 
 /// One that does nothing, on the thread that it has been moved to.
 class Last : public lc::Object {
@@ -222,14 +223,14 @@ void Session::start(const PhotometricLock& lock) {
 void Session::settle() {
   // Now, since the controls are compared with a calibration's, which has what became of them, when
   // the camera has been opened, and only then.
-  // This may be the capture thread, for which the watchdog waits ten seconds.
-  constexpr double kMaxNs = 4e9;
-  const auto timeout =
-      static_cast<std::int64_t>(std::min(kMaxNs, 1e9 + kSettlingFrames * 1e9 / fps_));
-  const bool said =
-      skip_frames(*this, kSettlingFrames, base::system_clock().monotonic_ns() + timeout,
-                  [this] { return !readings_.empty(); });
-  if (said) (void)PhotometricLock::compare(readings_, controls_);
+  (void)skip_frames(*this, kSettlingFrames, settling_deadline_ns(kMaxSettlingNs),
+                    [this] { return exchange_.has_readings(); });
+  (void)exchange_.compare(controls_);
+}
+
+std::int64_t Session::settling_deadline_ns(double max_ns) const noexcept {
+  const double ns = std::min(max_ns, 1e9 + kSettlingFrames * 1e9 / fps_);
+  return base::system_clock().monotonic_ns() + static_cast<std::int64_t>(ns);
 }
 
 void Session::stop() noexcept {
@@ -306,15 +307,7 @@ live::DequeueStatus Session::dequeue(live::FilledBuffer& out) noexcept {
     out.timestamp_ns = stamp;
     out.meaning = TimestampMeaning::end_of_frame;
   }
-  // The watching thread allocates while it holds these: not waited for, the next frame has them
-  // too.
-  const std::unique_lock guard(readings_mutex_, std::try_to_lock);
-  if (!guard) return live::DequeueStatus::filled;
-  try {
-    PhotometricLock::read(slot.request->metadata(), readings_);
-  } catch (const std::exception&) {
-    readings_.clear();  // no memory for them: the next frame tries again
-  }
+  exchange_.read(slot.request->metadata());
   return live::DequeueStatus::filled;
 }
 
@@ -323,38 +316,36 @@ bool Session::enqueue(int index) noexcept {
   const Slot& slot = slots_[static_cast<std::size_t>(index)];
   (void)sync_for_reading(slot.fd, false);
   slot.request->reuse(lc::Request::ReuseBuffers);
-  {
-    const std::unique_lock guard(readings_mutex_, std::try_to_lock);
-    if (guard && changed_controls_) {
-      slot.request->controls().merge(*changed_controls_);
-      changed_controls_.reset();
-    }
-  }
+  exchange_.hand_over(slot.request->controls());
   const bool taken = camera_->queueRequest(slot.request.get()) == 0;
   if (taken) ++queued_;
   return taken;
 }
 
 std::string Session::check_controls(std::vector<CameraControl>& controls) {
-  Readings readings;
-  {
-    const std::lock_guard guard(readings_mutex_);
-    readings = readings_;
-  }
-  return PhotometricLock::compare(readings, controls);
+  return exchange_.compare(controls);
 }
 
 void Session::change(const CameraChange& change, std::vector<CameraControl>& controls,
                      CameraSettings& settings) {
-  {
-    const std::lock_guard guard(readings_mutex_);
-    changed_controls_ = PhotometricLock::changed_controls(change, controls);
-  }
+  exchange_.change(change, controls);
   // The frames say what has become of it, once those that were under way have passed.
-  constexpr double kMaxSeconds = 4;
-  std::this_thread::sleep_for(
-      std::chrono::duration<double>(std::min(kMaxSeconds, kSettlingFrames / fps_)));
-  (void)check_controls(controls);
+  const std::int64_t deadline_ns = settling_deadline_ns(kMaxSettlingNs);
+  while (!exchange_.settled() && base::system_clock().monotonic_ns() < deadline_ns) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  (void)exchange_.compare(controls);
+  PhotometricLock::read_back(controls, settings);
+}
+
+void Session::change_before_use(const CameraChange& change, std::vector<CameraControl>& controls,
+                                CameraSettings& settings) {
+  exchange_.change(change, controls);
+  // A request carries the change, so frames must be taken: one to have a request, and those that
+  // settle. The first one that is used then has the change.
+  (void)skip_frames(*this, 1 + kSettlingFrames, settling_deadline_ns(kMaxChangingNs),
+                    [] { return true; });
+  (void)exchange_.compare(controls);
   PhotometricLock::read_back(controls, settings);
 }
 

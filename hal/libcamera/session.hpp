@@ -8,11 +8,11 @@
 #include <condition_variable>
 #include <memory>
 #include <mutex>
-#include <optional>
 #include <string>
 #include <vector>
 
 #include "hal/config.hpp"
+#include "hal/libcamera/control_exchange.hpp"
 #include "hal/libcamera/dma_buffer.hpp"
 #include "hal/libcamera/formats.hpp"
 #include "hal/libcamera/manager.hpp"
@@ -45,6 +45,8 @@ class Session final : public live::Source {
   [[nodiscard]] std::string check_controls(std::vector<CameraControl>& controls) override;
   void change(const CameraChange& change, std::vector<CameraControl>& controls,
               CameraSettings& settings) override;
+  void change_before_use(const CameraChange& change, std::vector<CameraControl>& controls,
+                         CameraSettings& settings) override;
   [[nodiscard]] const CameraSettings& settings() const noexcept { return settings_; }
 
  private:
@@ -66,6 +68,8 @@ class Session final : public live::Source {
   void start(const PhotometricLock& lock);
   /// Passes over the first frames, and notes in the controls what the last of them says.
   void settle();
+  /// Until when to wait for kSettlingFrames, at most `max_ns` from now.
+  [[nodiscard]] std::int64_t settling_deadline_ns(double max_ns) const noexcept;
   void on_completed(libcamera::Request* request);
   void on_disconnected();
 
@@ -91,10 +95,7 @@ class Session final : public live::Source {
   std::size_t completed_count_ = 0;
   bool gone_ = false;
 
-  // Shared with the threads that watch and change controls.
-  std::mutex readings_mutex_;
-  Readings readings_;
-  std::optional<libcamera::ControlList> changed_controls_;  // for the next request
+  ControlExchange exchange_;
 };
 
 }  // namespace dtact::hal::libcamera_backend

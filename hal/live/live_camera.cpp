@@ -45,7 +45,7 @@ void change_again(CameraChange change, Opened& opened) {
   if (!fits(change.gain, opened.settings.gain)) change.gain.reset();
   if (!change.exposure_us && !change.gain) return;
   try {
-    opened.source->change(change, opened.controls, opened.settings);
+    opened.source->change_before_use(change, opened.controls, opened.settings);
   } catch (const std::runtime_error&) {  // NOLINT(bugprone-empty-catch)
     // As above.
   }

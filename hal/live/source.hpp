@@ -85,6 +85,12 @@ class Source {
   /// std::runtime_error when the camera refuses.
   virtual void change(const CameraChange& /*change*/, std::vector<CameraControl>& /*controls*/,
                       CameraSettings& /*settings*/) {}
+  /// The same after the opening, while nobody takes frames yet: a source that changes its settings
+  /// with its buffers takes some itself. Called on the thread that opened it.
+  virtual void change_before_use(const CameraChange& change, std::vector<CameraControl>& controls,
+                                 CameraSettings& settings) {
+    this->change(change, controls, settings);
+  }
 };
 
 /// A device that has been opened and streams.

@@ -139,6 +139,16 @@ TEST_F(VirtualCamera, AFrameThatCannotBeReadSafelyIsDamaged) {
   EXPECT_FALSE(filled.flagged);
 }
 
+// It reports no exposure; that its frames are taken shows in their brackets.
+TEST_F(VirtualCamera, TakesFramesToChangeBeforeUse) {
+  const std::shared_ptr<Session> session = open(60);
+  std::vector<CameraControl> controls = session->controls();
+  CameraSettings settings = session->settings();
+  const std::size_t before = libcamera_test::kernel().syncs.size();
+  session->change_before_use({.exposure_us = 5000, .gain = {}}, controls, settings);
+  EXPECT_GE(libcamera_test::kernel().syncs.size() - before, 2U * kSettlingFrames);
+}
+
 TEST_F(VirtualCamera, RefusesARateThatTheCameraDoesNotHave) {
   try {
     (void)open(120);

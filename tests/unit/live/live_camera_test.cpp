@@ -63,6 +63,15 @@ class LeasingSource final : public Source {
   std::string check_controls(std::vector<CameraControl>& /*controls*/) override {
     return moved ? "gain moved from 5 to 60 by itself" : "";
   }
+  void change(const CameraChange& change, std::vector<CameraControl>& /*controls*/,
+              CameraSettings& settings) override {
+    settings.exposure_us->value = *change.exposure_us;
+  }
+  void change_before_use(const CameraChange& change, std::vector<CameraControl>& controls,
+                         CameraSettings& settings) override {
+    ++changes_before_use;
+    this->change(change, controls, settings);
+  }
 
   void fill(int index, std::uint8_t grey) {
     memory[static_cast<std::size_t>(index)].fill(grey);
@@ -88,6 +97,7 @@ class LeasingSource final : public Source {
   std::vector<int> index_to_requeue;  // requeued buffers
   std::uint32_t sequence = 0;
   int taken = 0;
+  int changes_before_use = 0;
 };
 
 CameraConfig small() {
@@ -392,6 +402,26 @@ TEST(LiveCamera, AReopenedCamerasFirstFrameIsWaitedFor) {
   rig.source = std::make_shared<LeasingSource>();
   EXPECT_EQ(rig.camera.grab(frame, milliseconds(300)), GrabStatus::timeout);
   EXPECT_NE(rig.camera.report().state, CameraState::stalled);
+}
+
+// Nobody takes its frames during the opening: a source that needs them to change must know.
+TEST(LiveCamera, AReopenedCameraIsChangedBeforeItsFramesAreUsed) {
+  auto source = std::make_shared<LeasingSource>();
+  LiveCamera camera(small(), "test", "nothing yet", [&source]() -> Opened {
+    const CameraSetting exposure{8000, 100, 10000};
+    return {source, "the one", "GREY", {}, {.exposure_us = exposure, .gain = {}}};
+  });
+  camera.start();
+  camera.change({.exposure_us = 4000, .gain = {}});
+  EXPECT_EQ(camera.info().settings.exposure_us->value, 4000);
+  EXPECT_EQ(source->changes_before_use, 0);
+  source->broken = true;
+  source = std::make_shared<LeasingSource>();
+  source->fill(0, 50);
+  Frame frame;
+  ASSERT_EQ(camera.grab(frame, milliseconds(1000)), GrabStatus::ok);
+  EXPECT_EQ(camera.info().settings.exposure_us->value, 4000);
+  EXPECT_EQ(source->changes_before_use, 1);
 }
 
 TEST(LiveCamera, RefusesImpossibleRates) {
