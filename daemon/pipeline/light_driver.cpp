@@ -87,7 +87,12 @@ void LightDriver::set_camera(Command command) {
     done.outcome = Outcome::device_error;
     done.message = e.what();
   }
-  note({.begins = false, .at_ns = clock_.monotonic_ns(), .light = light(), .camera = true});
+  // A light that is not known stays so.
+  note({.begins = false,
+        .at_ns = clock_.monotonic_ns(),
+        .light = light(),
+        .failed = !shown_ns_.has_value(),
+        .camera = true});
   done.command = std::move(command);
   emit(done);
 }

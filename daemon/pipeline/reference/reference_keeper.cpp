@@ -169,8 +169,14 @@ ReferenceStep ReferenceKeeper::settle(const hal::LumaView& luma) noexcept {
   }
   dark_frames_ = 0;
   if (settle_.add(now_.mean) || ++waited_ > rules_.timeout_frames) {
-    // Depth need not wait for a new reference where the last run's is of the same light.
-    if (stored_ && have_good_ && good_same_light_) return use_fallback();
+    // Depth need not wait for a new reference where the last run's is of the same light. The
+    // picture has to agree: the ring's light says nothing of exposure, ambient light and the camera
+    // itself.
+    if (stored_ && have_good_ && good_same_light_ &&
+        check_.compare(good_grid_, now_, region_, ContactCheck::kSameShape, field_).explained >=
+            kMinExplained) {
+      return use_fallback();
+    }
     start_average();
     phase_ = Phase::averaging;
   }
@@ -240,9 +246,13 @@ ReferenceStep ReferenceKeeper::use_fallback() noexcept {
   const Known known = best_known();
   // A single factor is measured best where most of the image is far from the contact: on all of it
   // (error 0.02 mm instead of 0.03 under a ball pressed 1 mm, simulated sensor).
-  const ContactVerdict verdict =
+  ContactVerdict verdict =
       same_shape_ ? check_.compare(*known.grid, now_, {}, ContactCheck::kSameShape, field_)
                   : check_.compare(*known.grid, now_, region_, ContactCheck::kAnyShape, field_);
+  if (same_shape_ && verdict.explained < kMinExplained) {
+    // A housing that fills most of the image is too dark to show a factor.
+    verdict = check_.compare(*known.grid, now_, region_, ContactCheck::kSameShape, field_);
+  }
   const bool same_light = have_good_ && good_same_light_;
   if (verdict.explained < kMinExplained) {
     // Most of the field is pressed. Under the same light the reference holds as it is.
