@@ -9,7 +9,10 @@
 #include <cstring>
 #include <filesystem>
 #include <stdexcept>
+#include <string>
+#include <string_view>
 #include <system_error>
+#include <vector>
 
 #include "daemon/app/config.hpp"
 #include "daemon/app/service.hpp"
@@ -20,6 +23,25 @@
 #include "hal/registry.hpp"
 
 namespace dtact::app {
+namespace {
+
+/// A power cut leaves the temporary file of a write. Nobody else writes while the folder is locked.
+void remove_cut_writes(const std::filesystem::path& folder) {
+  constexpr std::size_t kRandom = 6;  // characters that base::write_file_atomically() adds
+  std::vector<std::filesystem::path> left;
+  std::error_code ignored;
+  for (std::filesystem::directory_iterator entry(folder, ignored), end; !ignored && entry != end;
+       entry.increment(ignored)) {
+    const std::string name = entry->path().filename();
+    for (const std::string_view file :
+         {"reference.png.", "reference.toml.", "calibration.starts.", ".owner."}) {
+      if (name.starts_with(file) && name.size() == file.size() + kRandom) left.push_back(*entry);
+    }
+  }
+  for (const auto& file : left) std::filesystem::remove(file, ignored);
+}
+
+}  // namespace
 
 void check_readable(const std::string& key, const std::filesystem::path& path) {
   std::error_code ignored;
@@ -62,6 +84,7 @@ base::UniqueFd own_state_folder(const std::filesystem::path& folder, const std::
   const std::filesystem::path file = folder / ".owner";
   base::UniqueFd fd(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
   if (fd && ::flock(fd.get(), LOCK_EX | LOCK_NB) == 0) {
+    remove_cut_writes(folder);
     try {
       base::write_file_atomically(
           file, fmt::format("dtactd, process {}, sensor \"{}\"\n", ::getpid(), name));

@@ -156,7 +156,13 @@ bool FolderCalibrationStore::begin_start() {
 
 void FolderCalibrationStore::end_start() {
   std::error_code ignored;  // one too many was counted then
-  if (!passed_over_) fs::remove(state_ / kStarts, ignored);
+  if (passed_over_ || !fs::remove(state_ / kStarts, ignored)) return;
+  try {
+    // Else power cuts soon after good starts would count as starts that ended early.
+    base::sync_folder(state_);
+  } catch (const std::system_error&) {  // NOLINT(bugprone-empty-catch)
+    // A disk that cannot be written keeps no count, either.
+  }
 }
 
 FolderCalibrationStore::Digests FolderCalibrationStore::digests_of(const CalibrationFiles& files) {

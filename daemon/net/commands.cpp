@@ -182,7 +182,12 @@ void Commands::set_light(const Requester& requester, const v1::SetLight& request
 }
 
 void Commands::set_camera(const Requester& requester, const v1::SetCamera& request) {
-  const hal::CameraSettings has = port_.status().camera.settings;
+  const pipeline::Status now = port_.status();
+  const hal::CameraSettings& has = now.camera.settings;
+  if (now.state == pipeline::State::camera_lost && !has.exposure_us && !has.gain) {
+    // Which settings it has is known once it has been opened.
+    return requester.refuse(v1::ERROR_DEVICE, now.camera_report.fix);
+  }
   pipeline::SetCamera command;
   std::string wrong;
   if (request.has_exposure_us()) {

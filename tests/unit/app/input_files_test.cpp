@@ -104,7 +104,16 @@ TEST(StateFolder, HasOneOwnerWhoIsNamed) {
                          std::to_string(::getpid()) + ", sensor \"left\": "));
   EXPECT_THAT(refused, HasSubstr("state_dir"));
   left.reset();
+  // What a power cut left of writes goes; everything else stays.
+  for (const char* name : {"reference.png.aB3dE6", "calibration.starts.000000", "reference.png",
+                           "reference.png.old"}) {
+    base::write_file_atomically(folder / name, "");
+  }
   EXPECT_TRUE(own_state_folder(folder, "right"));
+  EXPECT_FALSE(std::filesystem::exists(folder / "reference.png.aB3dE6"));
+  EXPECT_FALSE(std::filesystem::exists(folder / "calibration.starts.000000"));
+  EXPECT_TRUE(std::filesystem::exists(folder / "reference.png"));
+  EXPECT_TRUE(std::filesystem::exists(folder / "reference.png.old"));
   EXPECT_THAT(error([&] { (void)own_state_folder(folder / "no", "left"); }),
               HasSubstr("state_dir"));
   std::filesystem::remove_all(folder);

@@ -223,5 +223,22 @@ TEST(SetCamera, PassesWhatIsInRangeAndAnswersWithWhatTheCameraHas) {
   expect_invalid(client, message, "set_camera.gain: this camera has no such control");
 }
 
+// Which settings a camera has is known once it has been opened.
+TEST(SetCamera, SaysWhereACameraThatWasNeverThereIs) {
+  Rig rig({}, [](FakePort& port) {
+    pipeline::Status status;
+    status.state = pipeline::State::camera_lost;
+    status.camera_report.fix = "/dev/video0 is not there: plug it in";
+    port.set_status(status);
+  });
+  RawClient client(rig.tcp_port());
+  client.hello();
+  v1::ClientMessage message;
+  message.mutable_set_camera()->set_gain(2);
+  const auto reply = client.request(message);
+  EXPECT_EQ(reply.error().code(), v1::ERROR_DEVICE);
+  EXPECT_EQ(reply.error().message(), "/dev/video0 is not there: plug it in");
+}
+
 }  // namespace
 }  // namespace dtact::net::test
