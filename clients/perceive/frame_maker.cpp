@@ -52,8 +52,7 @@ void FrameMaker::begin(v1::Frame frame, Wanted wanted) {
   if (!wanted.pose) release_pose();
   if (wanted.pose && depth_) follow(*depth_, frame_.depth().uncertainty_um());
   // A first map may be coarser than the network's; the next one is not.
-  const bool fine =
-      frame_.depth().decimation() <= 1 || frame_.depth().mm_per_px() <= TouchMap::kCellMm;
+  const bool fine = frame_.depth().mm_per_px() <= TouchMap::kCellMm;
   if (wanted.recognition && depth_ && depth_->is_whole() && fine) {
     if (!recognition_) recognition_ = std::make_unique<RecognitionThread>(taught_);
     recognition_->offer(depth_->whole(), frame_.sequence());

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <string>
+#include <string_view>
 
 namespace dtact::base {
 
@@ -14,6 +15,37 @@ inline std::string first_bytes(const std::string& text, std::size_t most) {
   };
   while (end > 0 && end < text.size() && continues(end)) --end;
   return text.substr(0, end);
+}
+
+/// Whether the text can be a protobuf `string`: no cut or overlong character, no half of a pair,
+/// nothing above U+10FFFF (Unicode 15, table 3-7).
+inline bool is_utf8(std::string_view text) {
+  for (std::size_t i = 0; i < text.size();) {
+    const auto byte_at = [&](std::size_t at) {
+      return at < text.size() ? static_cast<unsigned char>(text[at]) : 0U;
+    };
+    const unsigned first = byte_at(i);
+    const std::size_t length = first < 0x80 ? 1 : first < 0xE0 ? 2 : first < 0xF0 ? 3 : 4;
+    if ((first >= 0x80 && first < 0xC2) || first > 0xF4) return false;
+    for (std::size_t k = 1; k < length; ++k) {
+      if ((byte_at(i + k) & 0xC0U) != 0x80U) return false;
+    }
+    const unsigned second = byte_at(i + 1);
+    if ((first == 0xE0 && second < 0xA0) || (first == 0xED && second > 0x9F) ||
+        (first == 0xF0 && second < 0x90) || (first == 0xF4 && second > 0x8F)) {
+      return false;
+    }
+    i += length;
+  }
+  return true;
+}
+
+/// The text as a protobuf `string` takes it: '?' in place of each byte beyond ASCII where it is not
+/// UTF-8.
+inline std::string as_utf8(std::string text) {
+  if (is_utf8(text)) return text;
+  std::ranges::replace_if(text, [](char c) { return static_cast<unsigned char>(c) >= 0x80; }, '?');
+  return text;
 }
 
 /// The text with '?' in place of control characters, for logs and terminals.

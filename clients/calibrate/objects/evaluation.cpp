@@ -69,6 +69,7 @@ class Reader {
   }
 
   Samples samples;
+  std::vector<std::string> warnings;  ///< Recordings that could be read in part.
 
  private:
   void add_files(const fs::path& folder) {
@@ -101,7 +102,15 @@ class Reader {
       pressed |= add(touch_map_of(frame.depth()));
       return true;
     };
-    recording::read_recording(reader, handlers);
+    try {
+      recording::read_recording(reader, handlers);
+    } catch (const std::runtime_error& e) {
+      refuse(file, e.what());
+    }
+    if (!reader.damage().empty()) {
+      warnings.push_back(fmt::format("{}: not all of it could be read ({}): the rest is used",
+                                     file.string(), reader.damage()));
+    }
     if (pressed) ++group_;
     if (!depth) refuse(file, "its frames have no depth: record the daemon, not dtact-perceive");
   }
@@ -220,6 +229,7 @@ void evaluate(const EvaluationPlan& plan, std::ostream& out) {
     }
     out << fmt::format("{}: {} presses or objects\n", names[i], groups);
   }
+  for (const std::string& warning : reader.warnings) out << "warning: " << warning << '\n';
   const Samples& samples = reader.samples;
   Confusion table(names.size(), std::vector<double>(names.size()));
   std::size_t right = 0;

@@ -1,14 +1,18 @@
 #include "clients/calibrate/objects/objects_command.hpp"
 
+#include <fcntl.h>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <stdio.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <filesystem>
 #include <memory>
 #include <ostream>
 #include <stdexcept>
 #include <string>
+#include <system_error>
 
 #include "clients/calibrate/guided/console.hpp"
 #include "clients/calibrate/objects/evaluation.hpp"
@@ -17,6 +21,7 @@
 #include "clients/common/interruptible.hpp"
 #include "clients/common/json.hpp"
 #include "clients/perceive/recognition/taught_objects.hpp"
+#include "hal/base/utf8.hpp"
 
 namespace dtact::objects {
 namespace {
@@ -47,7 +52,7 @@ void list(const Options& options, const cli::Context& context) {
   cli::GuidedLine line;
   for (const std::string& name : perceive::taught_names(options.folder)) {
     cli::TaughtObject& object = *line.mutable_taught()->add_objects();
-    object.set_name(name);
+    object.set_name(base::as_utf8(name));
     try {
       object.set_presses(
           static_cast<std::uint32_t>(perceive::read_presses(options.folder, name).size()));
@@ -56,8 +61,8 @@ void list(const Options& options, const cli::Context& context) {
     }
     if (context.json) continue;
     context.out << (object.damage().empty()
-                        ? fmt::format("{}: {} presses\n", name, object.presses())
-                        : fmt::format("{}: damaged: {}\n", name, object.damage()));
+                        ? fmt::format("{}: {} presses\n", object.name(), object.presses())
+                        : fmt::format("{}: damaged: {}\n", object.name(), object.damage()));
   }
   if (context.json) context.out << cli::json_line(line);
 }
@@ -65,11 +70,18 @@ void list(const Options& options, const cli::Context& context) {
 void rename(const Options& options) {
   check_known(options);
   perceive::check_name(options.new_name);
+  if (options.new_name == options.name) return;
+  const fs::path from = perceive::file_of(options.folder, options.name);
   const fs::path to = perceive::file_of(options.folder, options.new_name);
-  if (fs::exists(to)) {
+  // In one step: a lesson, or another rename, may store that name at the same time.
+  if (::renameat2(AT_FDCWD, from.c_str(), AT_FDCWD, to.c_str(), RENAME_NOREPLACE) == 0) return;
+  if (errno == EEXIST || (errno == EINVAL && fs::exists(to))) {
     throw std::runtime_error(fmt::format("{} exists already: forget it first", options.new_name));
   }
-  fs::rename(perceive::file_of(options.folder, options.name), to);
+  if (errno != EINVAL) {
+    throw std::system_error(errno, std::generic_category(), "cannot rename " + from.string());
+  }
+  fs::rename(from, to);  // the file system knows no such step
 }
 
 void forget(const Options& options) {

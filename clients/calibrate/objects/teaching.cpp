@@ -43,6 +43,9 @@ class PressTaker {
       deepest_mm_ = 0;
     }
     if (taken_ || !frame.contact().in_contact() || !frame.has_depth()) return std::nullopt;
+    // The daemon may change its resolution at any frame: the press goes on with finer maps.
+    coarse_ = frame.depth().mm_per_px() > TouchMap::kCellMm;
+    if (coarse_) return std::nullopt;
     TouchMap map = touch_map_of(frame.depth());
     constexpr double kStillMm = 0.02;
     still_ = std::abs(map.deepest_mm - deepest_mm_) < kStillMm ? still_ + 1 : 0;
@@ -57,6 +60,8 @@ class PressTaker {
   /// What the user has to do now.
   [[nodiscard]] std::string wanted(bool first) const {
     if (!measured_) return "Wait: the daemon measures no contact at present";
+    if (coarse_)
+      return "Wait: the depth maps are too coarse: dtactctl reconstruction --resolution full";
     if (taken_) return "Lift it";
     if (deepest_mm_ > 0) return fault_.empty() ? "Hold it still" : fault_;
     return first ? "Press the object in" : "Press again: turned, or with another side";
@@ -64,6 +69,7 @@ class PressTaker {
 
  private:
   bool measured_ = true;
+  bool coarse_ = false;
   bool taken_ = false;
   int still_ = 0;
   double deepest_mm_ = 0;  ///< 0: no contact.
@@ -190,8 +196,8 @@ TouchMap touch_map_of(const v1::DepthMap& depth) {
   const perceive::DepthGrid grid = cli::grid_of(depth, values);
   if (grid.mm_per_px > TouchMap::kCellMm) {
     throw client::ProtocolError(
-        fmt::format("{} mm a pixel of the depth map: objects are taught with at most {} mm; check "
-                    "the calibration's scale",
+        fmt::format("{} mm a pixel of the depth map: objects are recognised with at most {} mm; "
+                    "choose a finer resolution, and check the calibration's scale",
                     grid.mm_per_px, TouchMap::kCellMm));
   }
   return perceive::touch_map(grid);

@@ -111,10 +111,12 @@ Recognised Evidence::result(int presses) const {
   if (now_.frames == 0) return found;
   std::vector<const Press*> joined;
   const bool shallow = now_.deepest_mm < kMinDeepestMm;
-  if (!shallow) joined.push_back(&now_);
-  for (auto press = before_.rbegin();
-       press != before_.rend() && static_cast<int>(joined.size()) < presses; ++press) {
-    joined.push_back(&*press);
+  if (!shallow) {
+    joined.push_back(&now_);
+    for (auto press = before_.rbegin();
+         press != before_.rend() && static_cast<int>(joined.size()) < presses; ++press) {
+      joined.push_back(&*press);
+    }
   }
   found.presses = static_cast<int>(joined.size());
   if (joined.empty()) joined.push_back(&now_);

@@ -59,20 +59,21 @@ void RecognitionThread::wait() {
 
 void RecognitionThread::read_taught() {
   decltype(files_) files;
+  std::shared_ptr<const std::vector<TaughtObject>> taught;
   try {
     for (std::string& name : taught_names(folder_)) {
       std::error_code damaged;
       const auto changed = std::filesystem::last_write_time(file_of(folder_, name), damaged);
       files.emplace_back(std::move(name), changed);
     }
-  } catch (const std::filesystem::filesystem_error&) {
-    return;  // The folder is unreadable: the objects known so far remain.
+    if (files == files_) return;
+    // A damaged file may be half copied: it is read again when it changes.
+    taught =
+        std::make_shared<const std::vector<TaughtObject>>(load_taught(network_, folder_).objects);
+  } catch (const std::exception&) {
+    return;  // The folder is unreadable, or went meanwhile: the objects known so far remain.
   }
-  if (files == files_) return;
   files_ = std::move(files);
-  // A damaged file may be half copied: it is read again when it changes.
-  auto taught =
-      std::make_shared<const std::vector<TaughtObject>>(load_taught(network_, folder_).objects);
   const std::scoped_lock lock(mutex_);
   evidence_.set_taught(std::move(taught));
 }

@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "hal/base/atomic_file.hpp"
+#include "hal/base/utf8.hpp"
 #include "hal/files/png.hpp"
 
 namespace dtact::perceive {
@@ -80,11 +81,12 @@ void check_name(const std::string& name) {
            std::string_view(" ._-").find(static_cast<char>(c)) != std::string_view::npos;
   };
   if (name.empty() || name.size() > kMaxLength || !std::ranges::all_of(name, allowed) ||
+      !base::is_utf8(name) ||
       std::string_view(" ._-").find(name.front()) != std::string_view::npos) {
     throw std::runtime_error(fmt::format(
         "\"{}\" is no name of an object: use 1 to {} letters, digits, spaces, and . _ - "
         "after the first",
-        name, kMaxLength));
+        base::as_utf8(name), kMaxLength));
   }
 }
 
@@ -102,6 +104,10 @@ std::vector<std::string> taught_names(const std::filesystem::path& folder) {
 
 std::vector<TouchMap> read_presses(const std::filesystem::path& folder, const std::string& name) {
   const auto file = file_of(folder, name);
+  if (!base::is_utf8(name)) {  // clients could not read a message with it
+    throw std::runtime_error(
+        fmt::format("{} has a name that is not UTF-8: rename it", base::as_utf8(file.string())));
+  }
   try {
     std::error_code error;
     if (!std::filesystem::is_regular_file(file, error)) {

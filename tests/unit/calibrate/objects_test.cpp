@@ -134,6 +134,20 @@ TEST_F(Evaluate, APressIsKnownByOtherPressesOnly) {
   EXPECT_THAT(said_, testing::Not(HasSubstr("as a new press: 1.000")));
 }
 
+TEST_F(Evaluate, ARecordingThatEndsEarlyIsUsedAndNamed) {
+  write_recording("presses/ball/1.mcap", {map_of(ball(4), 50, 40), map_of(ball(4), 71, 52)});
+  const std::string whole = base::read_file(at("presses/ball/1.mcap"));
+  base::write_file_atomically(at("presses/ball/2.mcap"), whole.substr(0, whole.size() - 20));
+  write_map("presses/plate/1.npy", map_of(corner, 55, 45));
+  write_map("presses/plate/2.npy", map_of(corner, 63, 47));
+  ASSERT_EQ(run({"--mm-per-px", "0.1668"}), 0) << said_;
+  EXPECT_THAT(said_, HasSubstr("warning: " + at("presses/ball/2.mcap") +
+                               ": not all of it could be read ("));
+  base::write_file_atomically(at("presses/ball/2.mcap"), whole.substr(0, 200));
+  EXPECT_NE(run({"--mm-per-px", "0.1668"}), 0);
+  EXPECT_THAT(said_, HasSubstr(at("presses/ball/2.mcap") + ": "));
+}
+
 TEST_F(Evaluate, WhatItCannotUseIsNamed) {
   EXPECT_NE(run(), 0);
   EXPECT_THAT(said_, HasSubstr(at("presses") + ": there is no such folder"));
@@ -179,6 +193,23 @@ TEST(TaughtObjects, ADamagedFileIsListedAndForgotten) {
   std::filesystem::remove(temp.path() / "folder.png" / "of somebody");
   EXPECT_EQ(run({"objects", "forget", "folder"}), "0 ");
   EXPECT_EQ(run({"objects", "list"}), "0 lid: 3 presses\n");
+}
+
+TEST(TaughtObjects, ARenameKeepsWhatHasTheName) {
+  const calibration::TempFolder temp;
+  perceive::write_presses(temp.path(), "lid", std::vector<perceive::TouchMap>(3));
+  perceive::write_presses(temp.path(), "cap", std::vector<perceive::TouchMap>(4));
+  const auto rename = [&](const std::string& name, const std::string& to) {
+    std::ostringstream out;
+    const int code =
+        calibrate::run({"objects", "rename", name, to, "--taught", temp.path().string()}, out, out);
+    return fmt::format("{} {}", code, out.str());
+  };
+  EXPECT_THAT(rename("lid", "cap"), HasSubstr("cap exists already: forget it first"));
+  EXPECT_EQ(perceive::read_presses(temp.path(), "cap").size(), 4U);
+  EXPECT_EQ(rename("lid", "lid"), "0 ");
+  EXPECT_EQ(rename("lid", "cover"), "0 ");
+  EXPECT_EQ(perceive::taught_names(temp.path()), (std::vector<std::string>{"cap", "cover"}));
 }
 
 }  // namespace

@@ -128,6 +128,15 @@ TEST(Evidence, HasAVerdictForEachCase) {
   EXPECT_EQ(verdict(map_of(1, 1.4), mostly(kClasses, 0.9)), Verdict::cut_off);
 }
 
+TEST(Evidence, AShallowTouchIsNotTheObjectBefore) {
+  Evidence evidence;
+  evidence.add(map_of(1), mostly(2, 0.9));
+  evidence.release();
+  evidence.add(map_of(0.15), mostly(3, 0.9));
+  EXPECT_EQ(evidence.result(1).verdict, Verdict::too_shallow);
+  EXPECT_EQ(evidence.result(5).presses, 0);
+}
+
 TEST(Evidence, JoinsAsManyContactsAsAreAskedFor) {
   Evidence evidence;
   for (int i = 0; i < 2; ++i) {
@@ -220,13 +229,16 @@ TEST(TaughtObjects, DamagedOnesAreNamedAndTheOthersStay) {
   std::filesystem::create_symlink("absent", folder / "link.png");
   ASSERT_EQ(::mkfifo((folder / "pipe.png").c_str(), 0600), 0);
   write("._whole.png", "of another system");
+  write("\xFC.png", bytes);  // a name in Latin-1
   Network network;
   const TaughtFolder taught = load_taught(network, folder);
   ASSERT_EQ(taught.objects.size(), 1U);
   EXPECT_EQ(taught.objects[0].name, "whole");
   const std::vector<std::string> damaged = {"cut off", "digest", "empty", "folder",
                                             "grey",    "link",   "pipe",  "text"};
-  ASSERT_EQ(taught.damaged.size(), damaged.size());
+  ASSERT_EQ(taught.damaged.size(), damaged.size() + 1);
+  EXPECT_EQ(taught.damaged.back(),
+            (folder / "?.png").string() + " has a name that is not UTF-8: rename it");
   for (std::size_t i = 0; i < damaged.size(); ++i) {
     EXPECT_TRUE(taught.damaged[i].starts_with(file_of(folder, damaged[i]).string()) ||
                 taught.damaged[i].starts_with("cannot read"))
