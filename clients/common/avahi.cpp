@@ -33,13 +33,19 @@ constexpr const char* kServer = "org.freedesktop.Avahi.Server";
 constexpr const char* kBrowser = "org.freedesktop.Avahi.ServiceBrowser";
 constexpr std::int32_t kAny = -1;  // interface or protocol
 constexpr std::chrono::seconds kInstanceTimeout{2};
+/// Avahi itself waits five seconds for a daemon that was switched off, and lists it for an hour.
+constexpr std::chrono::seconds kResolveTimeout{1};
+/// Look-ups at a time: the system bus allows 128 unanswered calls.
+constexpr std::size_t kMaxResolving = 64;
+/// Between two looks at a stop token.
+constexpr std::chrono::milliseconds kStopCheck{100};
 
 struct Unref {
   void operator()(sd_bus* bus) const noexcept { sd_bus_flush_close_unref(bus); }
-  void operator()(sd_bus_message* message) const noexcept { sd_bus_message_unref(message); }
+  void operator()(sd_bus_slot* slot) const noexcept { sd_bus_slot_unref(slot); }
 };
 using Bus = std::unique_ptr<sd_bus, Unref>;
-using Message = std::unique_ptr<sd_bus_message, Unref>;
+using Slot = std::unique_ptr<sd_bus_slot, Unref>;
 
 class Error {
  public:
@@ -105,24 +111,34 @@ Bus open_bus() {
   return Bus(opened);
 }
 
-std::vector<Instance> list_instances(sd_bus* bus, std::chrono::milliseconds timeout) {
+/// Handles what the bus sends until `done()`, a time or a stop.
+template <typename Done>
+void process(sd_bus* bus, steady_clock::time_point end, const std::stop_token& stop, Done done) {
+  while (!done() && !stop.stop_requested()) {
+    const int handled = sd_bus_process(bus, nullptr);
+    if (handled > 0) continue;
+    const auto left = std::min<steady_clock::duration>(end - steady_clock::now(), kStopCheck);
+    if (handled < 0 || left.count() <= 0) return;
+    sd_bus_wait(bus, static_cast<std::uint64_t>(
+                         std::chrono::ceil<std::chrono::microseconds>(left).count()));
+  }
+}
+
+std::vector<Instance> list_instances(sd_bus* bus, std::chrono::milliseconds timeout,
+                                     const std::stop_token& stop) {
   Received received;
   Error error;
   // Before the browser, which reports known services at once.
+  sd_bus_slot* match = nullptr;
   int result =
-      sd_bus_match_signal(bus, nullptr, kAvahi, nullptr, kBrowser, nullptr, on_signal, &received);
+      sd_bus_match_signal(bus, &match, kAvahi, nullptr, kBrowser, nullptr, on_signal, &received);
+  const Slot owner(match);
   if (result >= 0) {
     result = sd_bus_call_method(bus, kAvahi, "/", kServer, "ServiceBrowserNew", error.get(),
                                 nullptr, "iissu", kAny, kAny, wire::kServiceType, "", 0U);
   }
   if (result < 0) fail(error.text(result));
-  const auto end = steady_clock::now() + timeout;
-  while (!received.all && steady_clock::now() < end) {
-    if (sd_bus_process(bus, nullptr) > 0) continue;
-    const auto left =
-        std::chrono::duration_cast<std::chrono::microseconds>(end - steady_clock::now());
-    if (left.count() > 0) sd_bus_wait(bus, static_cast<std::uint64_t>(left.count()));
-  }
+  process(bus, steady_clock::now() + timeout, stop, [&] { return received.all; });
   return std::move(received.instances);
 }
 
@@ -137,16 +153,9 @@ std::vector<std::string> read_strings(sd_bus_message* message) {
   return all;
 }
 
-/// Nothing when the daemon left meanwhile.
-std::optional<FoundDaemon> resolve(sd_bus* bus, const Instance& instance) {
-  Error error;
-  sd_bus_message* answer = nullptr;
-  if (sd_bus_call_method(bus, kAvahi, "/", kServer, "ResolveService", error.get(), &answer,
-                         "iisssiu", instance.interface, instance.protocol, instance.name.c_str(),
-                         wire::kServiceType, instance.domain.c_str(), instance.protocol, 0U) < 0) {
-    return std::nullopt;
-  }
-  const Message message(answer);
+/// The answer of ResolveService; nothing when the daemon left meanwhile.
+std::optional<FoundDaemon> read_service(sd_bus_message* answer) {
+  if (sd_bus_message_is_method_error(answer, nullptr) > 0) return std::nullopt;
   std::int32_t interface = 0;
   std::int32_t protocol = 0;
   std::array<const char*, 5> texts{};  // name, type, domain, host, address
@@ -168,6 +177,41 @@ std::optional<FoundDaemon> resolve(sd_bus* bus, const Instance& instance) {
   }
   read_txt(read_strings(answer), found);
   return found;
+}
+
+/// Answers from ResolveService.
+struct Resolved {
+  std::vector<FoundDaemon> all;
+  std::size_t unanswered = 0;
+};
+
+int on_resolved(sd_bus_message* answer, void* user_data, sd_bus_error*) {
+  auto& resolved = *static_cast<Resolved*>(user_data);
+  --resolved.unanswered;
+  if (auto found = read_service(answer)) resolved.all.push_back(*std::move(found));
+  return 0;
+}
+
+/// Looks addresses up at the same time, so that daemons that were switched off do not hold up
+/// others.
+std::vector<FoundDaemon> resolve(sd_bus* bus, const std::vector<Instance>& instances,
+                                 steady_clock::time_point end, const std::stop_token& stop) {
+  (void)sd_bus_set_method_call_timeout(
+      bus, static_cast<std::uint64_t>(kResolveTimeout / std::chrono::microseconds(1)));
+  Resolved resolved;
+  auto next = instances.begin();
+  process(bus, end, stop, [&] {
+    for (; next != instances.end() && resolved.unanswered < kMaxResolving; ++next) {
+      if (sd_bus_call_method_async(bus, nullptr, kAvahi, "/", kServer, "ResolveService",
+                                   on_resolved, &resolved, "iisssiu", next->interface,
+                                   next->protocol, next->name.c_str(), wire::kServiceType,
+                                   next->domain.c_str(), next->protocol, 0U) >= 0) {
+        ++resolved.unanswered;
+      }
+    }
+    return resolved.unanswered == 0;
+  });
+  return std::move(resolved.all);
 }
 
 /// The name of a daemon, with that of its machine unless it is named after it: other machines may
@@ -234,12 +278,12 @@ void read_txt(const std::vector<std::string>& txt, FoundDaemon& to) {
   }
 }
 
-std::vector<FoundDaemon> browse(std::chrono::milliseconds timeout) {
+std::vector<FoundDaemon> browse(std::chrono::milliseconds timeout, const std::stop_token& stop) {
+  const auto end = steady_clock::now() + timeout;
   const Bus bus = open_bus();
-  std::vector<FoundDaemon> all;
-  for (const auto& instance : list_instances(bus.get(), timeout)) {
-    if (auto found = resolve(bus.get(), instance)) all.push_back(*std::move(found));
-  }
+  const std::vector<Instance> instances = list_instances(bus.get(), timeout, stop);
+  std::vector<FoundDaemon> all =
+      resolve(bus.get(), instances, std::max(end, steady_clock::now() + kResolveTimeout), stop);
   // On several interfaces it may be the same.
   const auto key = [](const FoundDaemon& one) {
     return std::tie(one.name(), one.address(), one.host());
@@ -252,8 +296,14 @@ std::vector<FoundDaemon> browse(std::chrono::milliseconds timeout) {
   return all;
 }
 
-std::vector<Finder::Found> Finder::look(std::chrono::milliseconds timeout) {
-  return add(browse(timeout));
+Finder::Finder(client::Options common, std::vector<NamedDaemon> named, std::size_t max_found)
+    : common_(std::move(common)), named_(std::move(named)), max_found_(max_found) {
+  for (const NamedDaemon& one : named_) names_.insert(one.name);
+}
+
+std::vector<Finder::Found> Finder::look(std::chrono::milliseconds timeout,
+                                        const std::stop_token& stop) {
+  return add(browse(timeout, stop));
 }
 
 std::vector<Finder::Found> Finder::add(const std::vector<FoundDaemon>& all) {
@@ -271,18 +321,18 @@ std::vector<Finder::Found> Finder::add(const std::vector<FoundDaemon>& all) {
       if (!known->second.name.empty()) changed.push_back(make(known->second.name, one));
       continue;
     }
-    if (known_.size() == kMaxFound) break;
+    if (known_.size() == max_found_) break;
+    if (!named) named = instances(named_);
     Known& fresh = known_[place];
     fresh.address = one.address();
-    if (!named) named = instances(named_);
     std::string name = name_of(one);
     if ((!one.instance().empty() && named->contains(one.instance())) ||
         std::ranges::find(named_, name, &NamedDaemon::name) != named_.end()) {
       continue;
     }
-    if (!names_.insert(name).second) {
-      name += fmt::format("_{}", one.port());
-      names_.insert(name);
+    const std::string wanted = name;
+    for (std::uint32_t number = one.port(); !names_.insert(name).second; ++number) {
+      name = fmt::format("{}_{}", wanted, number);
     }
     changed.push_back(make(name, one));
     if (changed.back().refused.empty()) fresh.name = name;
@@ -305,14 +355,15 @@ Finder::Found Finder::make(const std::string& name, const FoundDaemon& one) cons
 std::jthread watch_network(const client::Options& common, std::vector<NamedDaemon> named,
                            std::function<void(Finder::Found)> found,
                            std::function<void(const std::string&)> log) {
-  return std::jthread([finder = Finder(common, std::move(named)), found = std::move(found),
+  return std::jthread([finder = Finder(common, std::move(named), Finder::kMaxConnected),
+                       found = std::move(found),
                        log = std::move(log)](const std::stop_token& stop) mutable {
     std::mutex mutex;
     std::condition_variable_any stopped;
     std::string reported;
     while (!stop.stop_requested()) {
       try {
-        for (Finder::Found& one : finder.look(std::chrono::seconds(1))) found(std::move(one));
+        for (Finder::Found& one : finder.look(std::chrono::seconds(1), stop)) found(std::move(one));
         reported.clear();
       } catch (const std::exception& e) {
         if (std::exchange(reported, e.what()) != e.what()) log(reported);

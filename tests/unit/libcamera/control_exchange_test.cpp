@@ -58,7 +58,7 @@ TEST(ControlExchange, DoesNotJudgeAChangeByTheFramesBefore) {
     ASSERT_EQ(controls[0].value, 500) << taken;
     camera.pass(1, exchange);
   }
-  camera.pass(1, exchange);  // the first was read before the change was handed over
+  camera.pass(1, exchange);  // the first was read before the change was taken
   EXPECT_TRUE(exchange.settled());
   EXPECT_EQ(exchange.compare(controls), "");
   EXPECT_EQ(controls[0].verdict, ControlVerdict::confirmed);
