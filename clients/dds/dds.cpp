@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cctype>
 #include <chrono>
+#include <csignal>
 #include <deque>
 #include <map>
 #include <memory>
@@ -144,7 +145,12 @@ class Program {
         return true;
       }
     }
-    if (recorder_) log(fmt::format("{} messages recorded", recorder_->finish()));
+    if (recorder_) {
+      const std::uint64_t messages = recorder_->finish();
+      const std::uint64_t lost = recorder_->lost();
+      log(fmt::format("{} messages recorded{}", messages,
+                      lost == 0 ? "" : fmt::format("; {} lost because the disk is slow", lost)));
+    }
     return false;
   }
 
@@ -152,6 +158,19 @@ class Program {
   void add(const cli::NamedDaemon& daemon, const std::optional<client::Options>& perceive) {
     sensors_.emplace_back(graph_, daemon, perceive, settings_,
                           [this](const std::string& line) { log(line); });
+  }
+
+  /// Leaves out a daemon that no thread or descriptor is left for: any machine in the network can
+  /// announce any number of them.
+  void try_to_add(const cli::NamedDaemon& found) {
+    const std::size_t nodes = graph_.nodes();
+    try {
+      add(found, {});
+    } catch (const std::exception& e) {
+      graph_.keep_nodes(nodes);
+      log(fmt::format("{} at {}:{} is left out: {}", found.name, found.options.host,
+                      found.options.port, e.what()));
+    }
   }
 
   void announce() {
@@ -172,7 +191,7 @@ class Program {
     for (const cli::NamedDaemon& one : found) {
       const auto known = std::ranges::find(sensors_, one.name, &Sensor::name);
       if (known == sensors_.end()) {
-        add(one, {});
+        try_to_add(one);
       } else {
         log(fmt::format("{} is at {}:{} now", one.name, one.options.host, one.options.port));
         known->use(one.options);
@@ -266,6 +285,10 @@ void set_up(CLI::App& app, cli::Context& context) {
   app.add_flag("--humble", arguments->graph.humble,
                "Announce nodes as ROS 2 Humble does; else as Iron, Jazzy and later ones");
   app.callback([&context, arguments] {
+    // write() then reports a limit on the file's size, like a full disk, and a reader of the output
+    // that is gone, which does not matter to the graph.
+    (void)std::signal(SIGXFSZ, SIG_IGN);
+    (void)std::signal(SIGPIPE, SIG_IGN);
     const cli::Interruptible interruptible;
     while (Program(context, *arguments).run()) {
     }

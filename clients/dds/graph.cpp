@@ -36,8 +36,8 @@ std::string settings_of(const Graph::Config& config) {
   const bool local = config.interfaces.empty();
   std::string interfaces;
   for (const std::string& one : local ? own_addresses() : config.interfaces) {
-    const bool address = one.find_first_of(".:") != std::string::npos;
-    interfaces += fmt::format("<NetworkInterface {}=\"{}\"/>", address ? "address" : "name", one);
+    interfaces +=
+        fmt::format("<NetworkInterface {}=\"{}\"/>", is_address(one) ? "address" : "name", one);
   }
   std::string peers = "<Peer address=\"127.0.0.1\"/>";
   for (const std::string& one : config.peers) peers += fmt::format("<Peer address=\"{}\"/>", one);
@@ -151,6 +151,12 @@ dds_topic_descriptor_t humble_graph() {
 
 }  // namespace
 
+bool is_address(const std::string& interface) {
+  in6_addr ignored{};  // large enough for both
+  return ::inet_pton(AF_INET, interface.c_str(), &ignored) == 1 ||
+         ::inet_pton(AF_INET6, interface.c_str(), &ignored) == 1;
+}
+
 std::vector<std::string> own_addresses() {
   std::vector<std::string> addresses{"127.0.0.1"};
   ifaddrs* list = nullptr;
@@ -216,8 +222,9 @@ dds_entity_t Graph::add_writer(std::size_t node, const std::string& name,
   if (!humble_) set_type_hash(*qos, type.m_typename);
   const dds_entity_t writer =
       checked(dds_create_writer(participant_, topic("rt" + name, type), qos.get(), nullptr), name);
+  nodes_[node].entities.push_back(writer);
   nodes_[node].writers.push_back(guid_of(writer));
-  published_.push_back({name, &type, kind});
+  published_.push_back({name, &type, kind, node});
   return writer;
 }
 
@@ -225,8 +232,20 @@ dds_entity_t Graph::add_reader(std::size_t node, const std::string& name,
                                const dds_topic_descriptor_t& type) {
   const QosPointer qos = qos_of(Qos::command);
   const dds_entity_t reader = make_reader(name, type, *qos, readers_);
+  nodes_[node].entities.push_back(reader);
   nodes_[node].readers.push_back(guid_of(reader));
   return reader;
+}
+
+void Graph::keep_nodes(std::size_t count) {
+  for (; nodes_.size() > count; nodes_.pop_back()) {
+    for (const dds_entity_t entity : nodes_.back().entities) {
+      const dds_entity_t topic = dds_get_topic(entity);
+      dds_delete(entity);
+      dds_delete(topic);
+    }
+  }
+  std::erase_if(published_, [&](const Published& one) { return one.node >= count; });
 }
 
 dds_entity_t Graph::make_reader(const std::string& name, const dds_topic_descriptor_t& type,
@@ -245,7 +264,8 @@ dds_entity_t Graph::make_waitset() const {
 
 dds_entity_t Graph::subscribe(const Published& to, dds_entity_t waitset) const {
   const QosPointer qos = qos_of(to.qos);
-  dds_qset_history(qos.get(), DDS_HISTORY_KEEP_LAST, 100);
+  dds_qset_history(qos.get(), DDS_HISTORY_KEEP_ALL, DDS_LENGTH_UNLIMITED);
+  dds_qset_resource_limits(qos.get(), kMaxUnread, DDS_LENGTH_UNLIMITED, DDS_LENGTH_UNLIMITED);
   return make_reader(to.topic, *to.type, *qos, waitset);
 }
 

@@ -24,6 +24,7 @@ struct Node {
   std::string name;
   std::vector<dds_guid_t> readers = {};
   std::vector<dds_guid_t> writers = {};
+  std::vector<dds_entity_t> entities = {};  ///< Of both.
 };
 
 /// A participant of a DDS domain that ROS 2 sees as nodes: names of topics and types, type hashes
@@ -43,6 +44,7 @@ class Graph {
     std::string topic;
     const dds_topic_descriptor_t* type;
     Qos qos;
+    std::size_t node;
   };
 
   explicit Graph(const Config& config);
@@ -58,10 +60,16 @@ class Graph {
   /// Wakes wait() when messages come.
   [[nodiscard]] dds_entity_t add_reader(std::size_t node, const std::string& topic,
                                         const dds_topic_descriptor_t& type);
+  /// Removes all nodes but the first `count`, with their readers and writers.
+  void keep_nodes(std::size_t count);
+  [[nodiscard]] std::size_t nodes() const noexcept { return nodes_.size(); }
   [[nodiscard]] const std::vector<Published>& published() const noexcept { return published_; }
   /// A set of readers to wait for; see dds_waitset_wait().
   [[nodiscard]] dds_entity_t make_waitset() const;
-  /// A reader of an own topic, of the newest 100 messages, in `waitset`. No node owns it.
+  /// Messages that a reader of subscribe() keeps: about 16 s of a topic at 60 fps.
+  static constexpr std::int32_t kMaxUnread = 1000;
+  /// A reader of an own topic, in `waitset`. It keeps messages until they are taken, and rejects
+  /// new ones while it has kMaxUnread; see dds_get_sample_rejected_status(). No node owns it.
   [[nodiscard]] dds_entity_t subscribe(const Published& to, dds_entity_t waitset) const;
   /// Tells the others which nodes have which topics. Call it after the last change.
   void announce() const;
@@ -88,6 +96,9 @@ class Graph {
 /// other addresses: at most four, which is what Cyclone takes. A Graph without interfaces keeps
 /// those that it began with.
 [[nodiscard]] std::vector<std::string> own_addresses();
+
+/// Whether Config::interfaces has an address: "192.0.2.7", but "eth0.100" is a name.
+[[nodiscard]] bool is_address(const std::string& interface);
 
 /// Somebody subscribes to what it writes.
 [[nodiscard]] bool has_subscriber(dds_entity_t writer);

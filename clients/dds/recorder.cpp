@@ -57,6 +57,12 @@ Recorder::~Recorder() {
 std::uint64_t Recorder::finish() {
   ending_ = true;
   thread_.join();
+  for (const auto& [reader, _] : channels_) {
+    dds_sample_rejected_status_t status{};
+    if (dds_get_sample_rejected_status(reader, &status) == DDS_RETCODE_OK) {
+      lost_ += status.total_count;
+    }
+  }
   try {
     writer_.finish();
   } catch (...) {
@@ -69,7 +75,8 @@ std::uint64_t Recorder::finish() {
 void Recorder::run() {
   try {
     auto flushed = Clock::now();
-    while (!ending_) {
+    for (bool last = false; !last;) {
+      last = ending_;  // what has come while the disk was busy is still taken
       (void)dds_waitset_wait(waitset_, nullptr, 0, DDS_MSECS(100));
       for (const auto& [reader, channel] : channels_) take(reader, channel);
       if (Clock::now() - flushed < std::chrono::seconds(1)) continue;
@@ -83,7 +90,8 @@ void Recorder::run() {
 }
 
 void Recorder::take(dds_entity_t reader, std::uint16_t channel) {
-  for (;;) {
+  // Not without end: on a slow disk more may come than are written.
+  for (std::int32_t i = 0; i < Graph::kMaxUnread; ++i) {
     ddsi_serdata* message = nullptr;
     dds_sample_info_t info{};
     if (dds_takecdr(reader, &message, 1, &info, DDS_ANY_STATE) <= 0) return;
@@ -93,7 +101,8 @@ void Recorder::take(dds_entity_t reader, std::uint16_t channel) {
     }
     ddsi_serdata_unref(message);
     if (!info.valid_data) continue;
-    writer_.add(mcap::Message{channel, messages_++, static_cast<std::uint64_t>(ros_now()),
+    writer_.add(mcap::Message{channel, static_cast<std::uint32_t>(messages_++),
+                              static_cast<std::uint64_t>(ros_now()),
                               static_cast<std::uint64_t>(info.source_timestamp), buffer_});
   }
 }

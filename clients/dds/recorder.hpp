@@ -3,6 +3,7 @@
 #include <dds/dds.h>
 
 #include <atomic>
+#include <cstdint>
 #include <exception>
 #include <filesystem>
 #include <map>
@@ -29,6 +30,8 @@ class Recorder {
   [[nodiscard]] bool failed() const noexcept { return failed_; }
   /// Closes the file, also after a failure, and returns the number of messages.
   std::uint64_t finish();
+  /// Messages that came while Graph::kMaxUnread of their topic waited for the disk. After finish().
+  [[nodiscard]] std::uint64_t lost() const noexcept { return lost_; }
 
  private:
   void run();
@@ -39,7 +42,8 @@ class Recorder {
   dds_entity_t waitset_;
   std::map<dds_entity_t, std::uint16_t> channels_;  ///< By reader.
   std::string buffer_;
-  std::uint32_t messages_ = 0;
+  std::uint64_t messages_ = 0;
+  std::uint64_t lost_ = 0;
   std::atomic<bool> ending_ = false;
   std::atomic<bool> failed_ = false;
   std::exception_ptr failure_;  ///< Of the thread, until it has ended.

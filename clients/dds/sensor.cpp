@@ -6,7 +6,9 @@
 #include <chrono>
 #include <cmath>
 #include <cstdlib>
+#include <iterator>
 #include <stdexcept>
+#include <string_view>
 #include <utility>
 
 #include "clients/cpp/names.hpp"
@@ -17,11 +19,13 @@ namespace {
 
 // Ids on the wire; Hello's is 1.
 constexpr std::uint64_t kSubscribeId = 2;
-constexpr std::uint64_t kPingId = 3;
 constexpr std::uint64_t kStatusId = 4;
-constexpr std::uint64_t kFirstCommandId = 16;
+constexpr std::uint64_t kFirstFreeId = 16;  // of commands and pings
 
 constexpr std::size_t kMaxWaiting = 32;
+constexpr std::size_t kMaxPings = 16;
+/// Bytes of a name in a command; the names that the daemon knows are shorter.
+constexpr std::size_t kMaxWord = 64;
 /// Clocks of computers drift apart by less, a share of the time.
 constexpr double kMaxDrift = 100e-6;
 constexpr std::int64_t kStaleNs = 3'000'000'000;
@@ -45,7 +49,13 @@ void take_all(dds_entity_t reader, Take take) {
   }
 }
 
-std::string text_of(const char* value) { return value == nullptr ? "" : value; }
+/// A name from the graph as the wire takes it. There it may have any bytes, and the daemon ends the
+/// connection for a `string` that is not UTF-8; it refuses a wrong name by its own sentence.
+std::string word_of(const char* value) {
+  std::string word(std::string_view(value == nullptr ? "" : value).substr(0, kMaxWord));
+  std::ranges::replace_if(word, [](unsigned char c) { return c < 0x20 || c > 0x7e; }, '?');
+  return word;
+}
 
 }  // namespace
 
@@ -53,7 +63,7 @@ std::int64_t ros_now() { return now_of<std::chrono::system_clock>(); }
 
 Sensor::Sensor(Graph& graph, const cli::NamedDaemon& daemon,
                const std::optional<client::Options>& perceive, const Settings& settings, Log log)
-    : name_(daemon.name), settings_(settings), log_(std::move(log)), next_id_(kFirstCommandId) {
+    : name_(daemon.name), settings_(settings), log_(std::move(log)), next_id_(kFirstFreeId) {
   struct Known {
     const char* name;
     const dds_topic_descriptor_t* type;
@@ -103,6 +113,7 @@ void Sensor::connect(Upstream& upstream, const client::Options& options, const s
     if (is_daemon) {
       const std::lock_guard lock(mutex_);
       mapping_.reset();
+      pings_.clear();
       diagnosis_.hardware = hello.serial().empty() ? hello.name() : hello.serial();
     }
     {
@@ -211,18 +222,19 @@ void Sensor::each_second(bool diagnostics) {
 
 void Sensor::ping() {
   v1::ClientMessage message;
-  message.set_id(kPingId);
   message.mutable_ping();
   {
     const std::lock_guard lock(mutex_);
-    ping_ = {ros_now(), steady_now()};
+    message.set_id(next_id_);
+    pings_[next_id_++] = {ros_now(), steady_now()};
+    if (pings_.size() > kMaxPings) pings_.erase(pings_.begin());
   }
   const std::lock_guard lock(daemon_.mutex);
   daemon_.link->send(message.SerializeAsString());
 }
 
 void Sensor::on_reply(const v1::Reply& reply) {
-  if (reply.has_pong()) return on_pong(reply.pong());
+  if (reply.has_pong()) return on_pong(reply.id(), reply.pong());
   if (reply.has_status()) return on_status(reply.status());
   const std::string error = reply.has_error() ? reply.error().message() : "";
   Waiting waiting;
@@ -239,11 +251,16 @@ void Sensor::on_reply(const v1::Reply& reply) {
   write_result(results_[waiting.command], waiting.id, error);
 }
 
-void Sensor::on_pong(const v1::Pong& pong) {
+void Sensor::on_pong(std::uint64_t id, const v1::Pong& pong) {
   const std::int64_t steady = steady_now();
   const std::lock_guard lock(mutex_);
-  const std::int64_t half = (steady - ping_.sent_steady + 1) / 2;
-  const std::int64_t middle = ping_.sent_ns + half;
+  const auto found = pings_.find(id);
+  if (found == pings_.end()) return;
+  const Ping ping = found->second;
+  // Answers come in the order of the requests, so older pings have none any more.
+  pings_.erase(pings_.begin(), std::next(found));
+  const std::int64_t half = (steady - ping.sent_steady + 1) / 2;
+  const std::int64_t middle = ping.sent_ns + half;
   const ClockMapping made{middle, middle - pong.monotonic_ns(), half, pong.wall_ns() - middle};
   if (mapping_) {
     const double age = std::abs(static_cast<double>(middle - mapping_->measured_ns));
@@ -359,7 +376,9 @@ void Sensor::take_commands() {
       // What is out of range the daemon refuses by its own sentence.
       light.set_brightness(static_cast<std::uint32_t>(led.brightness));
     }
-    if (text_of(led.scheme) != "") light.set_scheme(led.scheme);
+    if (std::string scheme = word_of(led.scheme); !scheme.empty()) {
+      light.set_scheme(std::move(scheme));
+    }
     for (std::uint32_t i = 0; i < led.leds._length && i < 256; ++i) {
       const auto level = [](float channel) {
         return channel >= 0 && channel <= 1 ? static_cast<std::uint32_t>(std::lround(255 * channel))
@@ -379,7 +398,7 @@ void Sensor::take_commands() {
   });
   take_all<dtact_msgs_msg_dds__Resolution_>(commands_[kResolution], [&](const auto& resolution) {
     v1::ClientMessage message;
-    message.mutable_set_reconstruction()->set_resolution(text_of(resolution.resolution));
+    message.mutable_set_reconstruction()->set_resolution(word_of(resolution.resolution));
     pass_on(kResolution, resolution.id, std::move(message));
   });
 }
@@ -387,21 +406,22 @@ void Sensor::take_commands() {
 void Sensor::pass_on(Command command, std::uint64_t id, v1::ClientMessage message) {
   std::string error;
   {
-    const std::lock_guard lock(daemon_.mutex);
-    if (!daemon_.up) error = daemon_.reason;
-  }
-  if (error.empty()) {
+    // Held to the end, so that the handler of a connection that is lost meanwhile comes after it
+    // and answers this command, too.
+    const std::lock_guard upstream(daemon_.mutex);
     const std::lock_guard lock(mutex_);
-    if (waiting_.size() >= kMaxWaiting || !budget_.take(1)) {
+    if (!daemon_.up) {
+      error = daemon_.reason;
+    } else if (waiting_.size() >= kMaxWaiting || !budget_.take(1)) {
       error = "too many commands at once: ask again later";
     } else {
       message.set_id(next_id_);
+      message.set_on_behalf_of("ROS 2");
       waiting_[next_id_++] = {command, id};
+      daemon_.link->send(message.SerializeAsString());
     }
   }
-  if (!error.empty()) return write_result(results_[command], id, error);
-  message.set_on_behalf_of("ROS 2");
-  daemon_.link->send(message.SerializeAsString());
+  if (!error.empty()) write_result(results_[command], id, error);
 }
 
 void Sensor::fail_waiting(const std::string& reason) {

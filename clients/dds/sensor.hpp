@@ -95,7 +95,7 @@ class Sensor {
   void ping();
   void on_message(const std::string& bytes);
   void on_reply(const v1::Reply& reply);
-  void on_pong(const v1::Pong& pong);
+  void on_pong(std::uint64_t id, const v1::Pong& pong);
   void on_status(const v1::Status& status);
   void on_frame(const v1::Frame& frame);
   void on_object(const v1::Frame& frame);
@@ -113,7 +113,7 @@ class Sensor {
 
   mutable std::mutex mutex_;  ///< Guards the members from here on.
   std::optional<ClockMapping> mapping_;
-  Ping ping_;
+  std::map<std::uint64_t, Ping> pings_;  ///< Unanswered ones, by the id on the wire.
   v1::TimestampMeaning meaning_ = v1::TIMESTAMP_UNSPECIFIED;
   std::map<std::uint64_t, Waiting> waiting_;  ///< By the id on the wire.
   std::uint64_t next_id_;
