@@ -94,9 +94,10 @@ std::string Sensor::entry() const {
   return text + "}";
 }
 
-std::string Sensor::entry_with_status() const {
+std::string Sensor::entry_with_status(std::chrono::steady_clock::time_point now) const {
   std::string text = entry();
-  if (!status_.empty()) text.insert(text.size() - 1, ",\"status\":" + status_);
+  const bool known = !status_.empty() && now < status_came_ + kMaxStatusAge;
+  if (known) text.insert(text.size() - 1, ",\"status\":" + status_);
   return text;
 }
 
@@ -111,6 +112,7 @@ void Sensor::ask_status() {
                      const auto self = weak.lock();
                      if (self != nullptr && reply.has_status()) {
                        self->status_ = json_of(reply.status());
+                       self->status_came_ = std::chrono::steady_clock::now();
                      }
                    });
 }

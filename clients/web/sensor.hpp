@@ -34,8 +34,10 @@ class Sensor : public net::SessionHost, public std::enable_shared_from_this<Sens
   void admit(std::shared_ptr<WebSocket> socket, net::Peer peer, std::shared_ptr<void> place);
   /// The sensor's entry of /sensors, see README.md in this folder.
   [[nodiscard]] std::string entry() const;
-  /// The sensor's entry of /fleet: the same with its status, once that is known.
-  [[nodiscard]] std::string entry_with_status() const;
+  /// The sensor's entry of /fleet: the same with its status, where that came in the last
+  /// kMaxStatusAge.
+  [[nodiscard]] std::string entry_with_status(
+      std::chrono::steady_clock::time_point now = std::chrono::steady_clock::now()) const;
   /// Asks the daemon for its status, at most once a second however many viewers there are.
   void ask_status();
   [[nodiscard]] Source& source() const noexcept { return *source_; }
@@ -50,6 +52,7 @@ class Sensor : public net::SessionHost, public std::enable_shared_from_this<Sens
  private:
   /// Requests a second of one viewer, and as many at once after a rest.
   static constexpr double kMaxRequestsPerS = 100;
+  static constexpr std::chrono::seconds kMaxStatusAge{5};
 
   struct Viewer {
     WireTransport* transport = nullptr;  ///< The session's.
@@ -69,6 +72,7 @@ class Sensor : public net::SessionHost, public std::enable_shared_from_this<Sens
   net::SessionList session_list_;
   std::map<const net::Session*, Viewer> viewers_;
   std::string status_;  ///< In JSON; empty: not known.
+  std::chrono::steady_clock::time_point status_came_;
   std::chrono::steady_clock::time_point status_asked_;
 };
 

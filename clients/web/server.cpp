@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <exception>
 #include <utility>
 
 #include "clients/web/names.hpp"
@@ -106,11 +107,18 @@ void Server::add(const cli::Finder::Found& found) {
                                                       daemon.options.host, daemon.options.port)
                                         : found.refused});
   auto source = std::make_shared<Source>(io_, daemon.name, daemon.options, found.refused);
+  try {
+    // First, since it may fail: any machine in the network can announce more daemons than this
+    // program has threads and descriptors.
+    source->start();
+  } catch (const std::exception& e) {
+    return config_.log(
+        {net::LogLevel::warning, fmt::format("{} is left out: {}", daemon.name, e.what())});
+  }
   guided_->add(source);
   foxglove_->add(source);
   sensors_.push_back(std::make_shared<Sensor>(io_, std::move(source), config_, admission_));
   sensors_.back()->start();
-  sensors_.back()->source().start();
 }
 
 void Server::reload() {

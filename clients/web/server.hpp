@@ -45,7 +45,8 @@ class Server : public Site, public std::enable_shared_from_this<Server> {
 
   void start();
   /// A daemon that announced itself, after start(); of one whose name is known the address
-  /// is used from the next connection on.
+  /// is used from the next connection on. One that cannot be connected to for lack of threads or
+  /// descriptors is logged and left out.
   void add(const cli::Finder::Found& found);
   void stop();
   /// Reads certificate, key and tokens again, and ends who has a token no more. Throws as the

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <boost/asio/post.hpp>
+#include <exception>
 #include <utility>
 
 #include "hal/base/utf8.hpp"
@@ -204,7 +205,14 @@ void Source::subscribe(const Subscriber& subscriber, v1::Subscribe request, Answ
       return answered(error_reply(v1::ERROR_BUSY, std::move(sentence)));
     }
     const std::uint64_t number = next_serial_++;
-    streams_.push_back({number, key, subscriber.owner, open(number, request), false, {}});
+    try {
+      streams_.push_back({number, key, subscriber.owner, open(number, request), false, {}});
+    } catch (const std::exception& e) {
+      // It has a thread and a descriptor of its own.
+      return answered(
+          error_reply(v1::ERROR_BUSY,
+                      fmt::format("no more subscriptions to {} are made: {}", name_, e.what())));
+    }
     stream = std::prev(streams_.end());
   }
   stream->members.push_back({who, serial, std::move(answered), std::move(frame)});

@@ -1,0 +1,119 @@
+#include "clients/web/sensor.hpp"
+
+#include <gtest/gtest.h>
+
+#include <boost/asio/executor_work_guard.hpp>
+#include <boost/asio/io_context.hpp>
+#include <chrono>
+#include <memory>
+#include <string>
+
+#include "clients/web/page.hpp"
+#include "clients/web/server.hpp"
+#include "clients/web/source.hpp"
+#include "daemon/serve/admission.hpp"
+#include "tests/unit/client/played_daemon.hpp"
+#include "tests/unit/web/no_descriptors.hpp"
+
+namespace dtact::web {
+namespace {
+
+using client::test::kLong;
+using client::test::Peer;
+using client::test::PlayedDaemon;
+using std::chrono::seconds;
+using std::chrono::steady_clock;
+
+/// Runs `io` until `done()`, at most for kLong.
+template <typename Done>
+void run_until(boost::asio::io_context& io, Done done) {
+  io.restart();  // which ran out of work before
+  const auto work = boost::asio::make_work_guard(io);
+  const auto end = steady_clock::now() + kLong;
+  while (!done() && steady_clock::now() < end) io.run_for(std::chrono::milliseconds(10));
+}
+
+// Before: what somebody had asked for hours ago.
+TEST(Sensor, ShowsNoOldStatus) {
+  PlayedDaemon daemon({[](Peer& peer) {
+    peer.greet();
+    v1::Reply reply;
+    reply.mutable_status()->set_state(v1::STATE_SERVING);
+    peer.answer(reply);
+    (void)peer.ends_silently();
+  }});
+  boost::asio::io_context io;
+  const net::NetConfig config;
+  net::Admission admission(config);
+  const auto source = std::make_shared<Source>(io, "left", daemon.options);
+  const auto sensor = std::make_shared<Sensor>(io, source, config, admission);
+  sensor->start();
+  source->start();
+  const auto shows_status = [&](seconds later) {
+    return sensor->entry_with_status(steady_clock::now() + later).find("\"status\"") !=
+           std::string::npos;
+  };
+  run_until(io, [&] { return source->connected(); });
+  EXPECT_FALSE(shows_status(seconds(0)));
+  sensor->ask_status();
+  run_until(io, [&] { return shows_status(seconds(0)); });
+  EXPECT_TRUE(shows_status(seconds(0)));
+  EXPECT_FALSE(shows_status(seconds(5)));
+  sensor->stop();
+  source->stop();
+}
+
+TEST(Source, WithoutDescriptorsRefusesASubscription) {
+  PlayedDaemon daemon({[](Peer& peer) {
+    peer.greet();
+    (void)peer.ends_silently();
+  }});
+  boost::asio::io_context io;
+  const auto source = std::make_shared<Source>(io, "left", daemon.options);
+  source->start();
+  run_until(io, [&] { return source->connected(); });
+  ASSERT_TRUE(source->connected());
+  v1::Subscribe request;
+  request.set_summary(true);
+  v1::Reply answer;
+  {
+    const test::NoDescriptors none;
+    source->subscribe(
+        {.who = &answer, .owner = "test", .may_control = true}, request,
+        [&](const v1::Reply& reply) { answer = reply; }, [](const RelayedFrame&, std::uint64_t) {});
+  }
+  EXPECT_EQ(answer.error().code(), v1::ERROR_BUSY);
+  EXPECT_TRUE(answer.error().message().starts_with("no more subscriptions to left are made: "))
+      << answer.error().message();
+  source->stop();
+}
+
+// Before: the exception ended the program, which found the same daemons again.
+TEST(Server, WithoutDescriptorsLeavesOutWhatIsFound) {
+  boost::asio::io_context io;
+  std::string log;
+  Settings settings;
+  settings.net.port = 0;
+  settings.net.log = [&](const net::LogLine& line) { log += line.text + '\n'; };
+  const Page page;
+  const auto server = std::make_shared<Server>(io, std::move(settings), page);
+  server->start();
+  Request request;
+  request.target("/sensors");
+  request.set(boost::beast::http::field::host, "127.0.0.1");
+  cli::Finder::Found found;
+  found.daemon.name = "left";
+  found.daemon.options.host = "unix:/no/such/socket";
+  {
+    const test::NoDescriptors none;
+    server->add(found);
+  }
+  EXPECT_EQ(server->answer(request, {}).text, "[]");
+  EXPECT_NE(log.find("left is left out: "), std::string::npos) << log;
+  server->add(found);
+  EXPECT_NE(server->answer(request, {}).text.find("left"), std::string::npos);
+  server->stop();
+}
+
+}  // namespace
+}  // namespace dtact::web
