@@ -16,7 +16,7 @@ void ControlExchange::change(const CameraChange& change, std::vector<CameraContr
   frames_to_settle_ = kSettlingFrames;
 }
 
-void ControlExchange::hand_over(lc::ControlList& request) noexcept {
+void ControlExchange::add_changes(lc::ControlList& request) noexcept {
   const std::unique_lock guard(mutex_, std::try_to_lock);
   if (!guard || !changed_) return;
   request.merge(*changed_);

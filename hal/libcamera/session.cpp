@@ -316,7 +316,7 @@ bool Session::enqueue(int index) noexcept {
   const Slot& slot = slots_[static_cast<std::size_t>(index)];
   (void)sync_for_reading(slot.fd, false);
   slot.request->reuse(lc::Request::ReuseBuffers);
-  exchange_.hand_over(slot.request->controls());
+  exchange_.add_changes(slot.request->controls());
   const bool taken = camera_->queueRequest(slot.request.get()) == 0;
   if (taken) ++queued_;
   return taken;

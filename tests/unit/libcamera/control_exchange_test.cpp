@@ -24,7 +24,7 @@ class DelayedCamera {
       under_way_.pop_front();
       exchange.read(metadata);
       lc::ControlList request(lc::controls::controls);
-      exchange.hand_over(request);
+      exchange.add_changes(request);
       if (request.contains(lc::controls::ExposureTime.id())) {
         asked_ = *request.get(lc::controls::ExposureTime) / 15 * 15;
       }
@@ -85,11 +85,11 @@ TEST(ControlExchange, KeepsAChangeThatNoRequestHasTakenYet) {
   exchange.change({.exposure_us = 500, .gain = 1}, controls);
   exchange.change({.exposure_us = {}, .gain = 2}, controls);
   lc::ControlList request(lc::controls::controls);
-  exchange.hand_over(request);
+  exchange.add_changes(request);
   EXPECT_EQ(request.get(lc::controls::ExposureTime), 500);
   EXPECT_EQ(request.get(lc::controls::AnalogueGain), 2.0F);
   lc::ControlList next(lc::controls::controls);
-  exchange.hand_over(next);
+  exchange.add_changes(next);
   EXPECT_TRUE(next.empty());
 }
 
