@@ -119,6 +119,17 @@ class Aio(unittest.IsolatedAsyncioTestCase):
                 with self.assertRaisesRegex(dtact.ConnectionError, "was closed"):
                     await s.status()
 
+    async def test_kept_frames_outlive_the_connection(self):
+        with FakeDaemon() as daemon:
+            daemon.pushed = [frame(1), frame(2)]
+            async with dtact.aio.connect(daemon.address, reconnect=True, kept_frames=4) as s:
+                await s.subscribe()
+                daemon.drop()
+                daemon.pushed = [frame(3)]
+                self.assertIsInstance(await self.first(s.events(timeout=10)), dtact.Reconnected)
+                taken = [(await s.next(5)).sequence for _ in range(3)]
+                self.assertEqual(taken, [1, 2, 3])
+
     async def test_several_tasks_share_one_new_connection(self):
         with FakeDaemon() as daemon:
             daemon.pushed = [frame(1), event(2)]

@@ -60,6 +60,28 @@ class Breaking(unittest.TestCase):
                 s.set_light(brightness=1)  # It was under way: it may have been done or not.
             self.assertEqual(s.set_light(brightness=1).brightness, 1)
 
+    def test_kept_frames_outlive_the_connection(self):
+        with FakeDaemon() as daemon, \
+                dtact.connect(daemon.address, reconnect=True, kept_frames=4) as s:
+            daemon.pushed = [frame(1), frame(2)]
+            s.subscribe()
+            daemon.drop()
+            daemon.pushed = [frame(3)]
+            self.assertIsInstance(next(s.events(timeout=10)), dtact.Reconnected)
+            frames = s.frames(timeout=10)
+            self.assertEqual([next(frames).sequence for _ in range(3)], [1, 2, 3])
+
+    def test_a_new_subscription_drops_them(self):
+        with FakeDaemon() as daemon, \
+                dtact.connect(daemon.address, reconnect=True, kept_frames=4) as s:
+            daemon.pushed = [frame(1)]
+            s.subscribe()
+            daemon.drop()
+            self.assertIsInstance(next(s.events(timeout=10)), dtact.Reconnected)
+            daemon.pushed = [frame(2)]
+            s.subscribe(dtact.Subscription(every=2))
+            self.assertEqual(next(s.frames(timeout=10)).sequence, 2)
+
     def test_waits_for_a_daemon_that_comes_back(self):
         with tempfile.TemporaryDirectory() as folder:
             with FakeDaemon(path=f"{folder}/socket") as daemon:

@@ -85,12 +85,19 @@ class Inbox(unittest.TestCase):
         self.assertEqual(c.take_frame().sequence, 2)
         self.assertIsNone(c.take_frame())
 
-    def test_events_outlive_a_connection(self):
+    def test_what_was_not_taken_outlives_a_connection(self):
         c = Conversation(4)
         feed(c, packed(event(1)) + packed(frame(1)))
         following = c.successor()
-        feed(following, packed(event(2)))
-        self.assertEqual([following.take().light.brightness for _ in range(2)], [1, 2])
+        message = ClientMessage()
+        message.subscribe.depth = 1
+        number, _ = following.request(message, again=True)
+        feed(following, packed(reply(number)) + packed(event(2)) + packed(frame(2)))
+        self.assertEqual(following.take().light.brightness, 1)
+        self.assertEqual(following.take().sequence, 1)
+        self.assertEqual(following.take().light.brightness, 2)
+        number, _ = following.request(message)
+        feed(following, packed(reply(number)))
         self.assertIsNone(following.take())
 
     def test_unknown_bodies_and_events_are_passed_over(self):

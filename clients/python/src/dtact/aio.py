@@ -323,7 +323,7 @@ class Client(Session):
             server = await self._exchange(self._hello())
             self._server = server
             if self._subscription is not None:
-                await self._exchange(self._subscribe_request(self._subscription))
+                await self._exchange(self._subscribe_request(self._subscription, again=True))
         except BaseException as e:  # Cancellation too: the link would stay open.
             self._lost(e if isinstance(e, Error) else ConnectionError(
                 f"connecting to {self._address} was given up"))

@@ -271,7 +271,7 @@ class Client(Session):
             server = self._exchange(self._hello(), deadline)
             self._server = server
             if self._subscription is not None:
-                self._exchange(self._subscribe_request(self._subscription), deadline)
+                self._exchange(self._subscribe_request(self._subscription, again=True), deadline)
         except Error as e:
             self._lost(e)
             self._note_failure()

@@ -52,7 +52,7 @@ class Conversation:
         self._filled = 0
         self._next_id = 1
         self._waiting: set[int] = set()
-        self._subscribing = 0  # The number of the last request to subscribe.
+        self._subscribing = 0  # The number of the last request to subscribe otherwise than before.
         self._arrivals = 0
         self._frames: _Numbered[Frame] = _Numbered(kept_frames)
         self._events: _Numbered[Event] = _Numbered(MAX_EVENTS)
@@ -64,9 +64,10 @@ class Conversation:
         self.last_sequence = 0
 
     def successor(self) -> Conversation:
-        """The conversation for the next connection; it keeps the events not taken yet."""
+        """The conversation for the next connection; it keeps the frames and events not taken yet."""
         other = Conversation(self._kept_frames)
         other._arrivals = self._arrivals
+        other._frames = self._frames
         other._events = self._events
         other.last_sequence = self.last_sequence
         return other
@@ -78,8 +79,9 @@ class Conversation:
 
     # ------------------------------------------------------------ out
 
-    def request(self, message: Message) -> tuple[int, bytes]:
-        """Its number, and the bytes to send. ValueError for one that is too long."""
+    def request(self, message: Message, again: bool = False) -> tuple[int, bytes]:
+        """Its number, and the bytes to send. `again`: it subscribes as before, and frames not taken
+        yet are kept. ValueError for one that is too long."""
         number = self._next_id
         message.id = number
         body = message.SerializeToString()
@@ -87,7 +89,7 @@ class Conversation:
             raise ValueError(f"the request has {len(body)} bytes, at most {MAX_BYTES} can be sent")
         self._next_id += 1
         self._waiting.add(number)
-        if message.HasField("subscribe"):
+        if message.HasField("subscribe") and not again:
             self._subscribing = number
         return number, len(body).to_bytes(4, "big") + body
 

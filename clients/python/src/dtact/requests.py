@@ -35,6 +35,8 @@ class Request(Generic[T]):
     slow: bool = False
     #: Frames are averaged before the request is answered.
     averages: bool = False
+    #: Subscribes as before: frames not taken yet are kept.
+    again: bool = False
 
 
 def _nothing(reply: Message) -> None:
@@ -54,10 +56,10 @@ def hello(program: str, token: str | None) -> Request[Server]:
     return Request(message, lambda reply: Server.of(reply.hello))
 
 
-def subscribe(subscription: Subscription, same_machine: bool) -> Request[None]:
+def subscribe(subscription: Subscription, same_machine: bool, again: bool = False) -> Request[None]:
     message = ClientMessage()
     message.subscribe.CopyFrom(subscription.message(same_machine))
-    return Request(message, _nothing)
+    return Request(message, _nothing, again=again)
 
 
 def unsubscribe() -> Request[None]:

@@ -163,7 +163,7 @@ class Session:
 
     def _prepare(self, request: Request[T]) -> tuple[int, bytes]:
         """The number and bytes of a request."""
-        return self._conversation.request(request.message)
+        return self._conversation.request(request.message, request.again)
 
     def _answer(self, reply: Message, request: Request[T]) -> T:
         """What the answer says. The daemon's refusal is raised."""
@@ -200,10 +200,11 @@ class Session:
             return self._timeout + self._server.rezero_timeout_s
         return max(self._timeout, _SLOW_S) if request.slow else self._timeout
 
-    def _subscribe_request(self, subscription: Subscription | None) -> Request[None]:
+    def _subscribe_request(self, subscription: Subscription | None,
+                           again: bool = False) -> Request[None]:
         if subscription is None:
             return requests.unsubscribe()
-        return requests.subscribe(subscription, self._local)
+        return requests.subscribe(subscription, self._local, again)
 
     def _no_frame(self, seconds: float, status: Status) -> str:
         advice = status.advice or "Has what was subscribed a frame at all?"
