@@ -84,6 +84,52 @@ test("any of them is opened", async () => {
   );
 });
 
+/** Addresses of the list. */
+const LIST = /\/fleet(\?.*)?$/;
+
+test("a sensor that the gateway has no longer leaves the list", async () => {
+  const palm = fleet.getByRole("button", { name: "palm" });
+  assert.equal(await palm.count(), 1);
+  await view.page.route(LIST, async (route) => {
+    const response = await route.fetch();
+    const entries = await response.json();
+    await route.fulfill({ response, json: entries.filter(({ name }) => name !== "palm") });
+  });
+  const shown = (wanted) => until(() => palm.count(), (count) => count === wanted, 10_000);
+  await shown(0);
+  assert.match(await fleet.getByRole("status").textContent(), /^3 sensors/);
+  await view.page.unroute(LIST);
+  await shown(1);
+});
+
+test("a refused token does not hide one that is good", async () => {
+  const enter = (...names) =>
+    view.page.evaluate((names) => {
+      sessionStorage.clear();
+      for (const name of names) sessionStorage.setItem(`dtact token ${name}`, `of ${name}`);
+    }, names);
+  await enter("index_left", "index_right");
+  // Whichever the page tries first is refused.
+  const tried = [];
+  await view.page.route(LIST, (route) => {
+    tried.push(new URL(route.request().url()).searchParams.get("token"));
+    return tried.at(-1) === tried[0] ? route.fulfill({ status: 401 }) : route.fallback();
+  });
+  await until(() => tried.length, (count) => count >= 3, 10_000);
+  assert.notEqual(tried[1], tried[0]);
+  assert.equal(tried[2], tried[1]);
+  await until(
+    () => fleet.getByRole("status").textContent(),
+    (text) => /^4 sensors/.test(text),
+    10_000,
+  );
+  await view.page.unroute(LIST);
+  await enter();
+  // The console reports the refusal.
+  const reported = view.complaints.splice(0);
+  assert.ok(reported.every((text) => text.includes("401")), reported.join("\n"));
+});
+
 test("it fits a desktop and a phone, and axe-core finds nothing", async () => {
   for (const [name, size] of Object.entries({ desktop: DESKTOP, phone: PHONE })) {
     await view.page.setViewportSize(size);

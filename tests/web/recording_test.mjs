@@ -2,7 +2,7 @@
 // of the daemon.
 import assert from "node:assert/strict";
 import { execFileSync } from "node:child_process";
-import { readFileSync, writeFileSync } from "node:fs";
+import { copyFileSync, readFileSync, writeFileSync } from "node:fs";
 import { createRequire } from "node:module";
 import path from "node:path";
 import { after, before, test } from "node:test";
@@ -232,6 +232,45 @@ for (const [by, make] of [
   });
 }
 
+test("one that is paused while it is opened shows its first frame, and plays from there", async () => {
+  const file = path.join(work, "paused.mcap");
+  copyFileSync(path.join(work, "ctl.mcap"), file);
+  const [first] = framesOf(file);
+  // Before the worker has read any of the file.
+  await view.page.evaluate(() => {
+    const observer = new MutationObserver(() => {
+      const pause = document.querySelector("[data-recording] .timeline button");
+      pause?.click();
+      if (pause) observer.disconnect();
+    });
+    observer.observe(document.body, { childList: true, subtree: true });
+  });
+  const player = await play(file);
+  const sequence = async () => Number(await player.getAttribute("data-sequence"));
+  await until(sequence, (shown) => shown === first.sequence);
+  await new Promise((done) => setTimeout(done, 500));
+  assert.equal(await sequence(), first.sequence);
+  assert.equal(await player.locator(".timeline .trouble").textContent(), "");
+  await player.getByRole("button", { name: "Resume" }).click();
+  await until(sequence, (shown) => shown > first.sequence);
+  await close(player);
+});
+
+/** A recording of another program: `fill` is given its writer. */
+async function made(fill) {
+  const parts = [];
+  const writer = new McapWriter({
+    writable: {
+      write: async (part) => void parts.push(Buffer.from(part)),
+      position: () => BigInt(Buffer.concat(parts).length),
+    },
+  });
+  await writer.start({ profile: "", library: "another" });
+  await fill(writer);
+  await writer.end();
+  return Buffer.concat(parts);
+}
+
 test("of a damaged recording the rest plays; what is none says what is wrong", async () => {
   const whole = readFileSync(path.join(work, "ctl.mcap"));
   const written = (name, bytes) => {
@@ -252,23 +291,23 @@ test("of a damaged recording the rest plays; what is none says what is wrong", a
     (count) => count === 1,
   );
   await close(player);
-  const parts = [];
-  const foreign = new McapWriter({
-    writable: {
-      write: async (part) => void parts.push(Buffer.from(part)),
-      position: () => BigInt(Buffer.concat(parts).length),
-    },
+  const foreign = await made(async (writer) => {
+    const channel = { schemaId: 0, topic: "/x", messageEncoding: "json", metadata: new Map() };
+    const channelId = await writer.registerChannel(channel);
+    await writer.addMessage({ channelId, sequence: 0, logTime: 1n, publishTime: 1n, data: Buffer.from("{}") });
   });
-  await foreign.start({ profile: "", library: "another" });
-  const messageEncoding = "json";
-  const channelId = await foreign.registerChannel({ schemaId: 0, topic: "/x", messageEncoding, metadata: new Map() });
-  await foreign.addMessage({ channelId, sequence: 0, logTime: 1n, publishTime: 1n, data: Buffer.from("{}") });
-  await foreign.end();
+  const noMessages = await made(async (writer) => {
+    const schema = { name: "dtact.v1.Frame", encoding: "protobuf", data: new Uint8Array() };
+    const schemaId = await writer.registerSchema(schema);
+    const channel = { schemaId, topic: "/dtact/frame", messageEncoding: "protobuf", metadata: new Map() };
+    await writer.registerChannel(channel);
+  });
   const cases = {
     "text.mcap": [Buffer.from("no recording, but longer than the head of one"), /cannot be played/],
     "empty.mcap": [Buffer.alloc(0), /cannot be played: it ends too early/],
     "cut.mcap": [whole.subarray(0, whole.length * 0.7), /cannot be played: .*mcap recover/],
-    "foreign.mcap": [Buffer.concat(parts), /it has no frames of dtactd, only \/x/],
+    "foreign.mcap": [foreign, /it has no frames of dtactd, only \/x\.$/],
+    "no_messages.mcap": [noMessages, /cannot be played: it has no frames\.$/],
   };
   for (const [name, [bytes, sentence]] of Object.entries(cases)) {
     const player = await play(written(name, bytes));

@@ -65,7 +65,7 @@ export class Fleet {
   private readonly rows = new Map<string, Row>();
   private timer = 0;
   /** A token that was refused is not tried again: each try is answered later than the last. */
-  private refused: string | undefined;
+  private readonly refused = new Set<string>();
 
   constructor(
     private readonly open: (name: string) => void,
@@ -87,11 +87,11 @@ export class Fleet {
   private async poll(): Promise<void> {
     let pause = POLL_MS;
     try {
-      const query = token();
-      if (query === this.refused) throw new Error(NO_TOKEN);
+      const query = tokens().find((one) => !this.refused.has(one));
+      if (query === undefined) throw new Error(NO_TOKEN);
       const response = await fetch(`fleet${query}`, { cache: "no-store" });
-      this.refused = response.status === 401 ? query : undefined;
-      if (!response.ok) throw new Error(this.refused === query ? NO_TOKEN : await response.text());
+      if (response.status === 401) this.refused.add(query);
+      if (!response.ok) throw new Error(this.refused.has(query) ? NO_TOKEN : await response.text());
       const entries = (await response.json()) as Entry[];
       this.show(entries);
       if (entries.some(({ connected, status }) => connected && !status)) pause = FIRST_POLL_MS;
@@ -103,6 +103,12 @@ export class Fleet {
   }
 
   private show(entries: Entry[]): void {
+    // The gateway may have been started again with other sensors.
+    for (const [name, row] of this.rows) {
+      if (entries.some((entry) => entry.name === name)) continue;
+      row.element.remove();
+      this.rows.delete(name);
+    }
     let unwell = 0;
     for (const entry of entries) {
       let row = this.rows.get(entry.name);
@@ -118,10 +124,9 @@ export class Fleet {
   }
 }
 
-/** The gateway's token that was entered for a sensor, as part of an address. */
-function token(): string {
-  for (const [key, value] of Object.entries(sessionStorage)) {
-    if (key.startsWith("dtact token ")) return `?token=${encodeURIComponent(value as string)}`;
-  }
-  return "";
+/** The tokens that were entered for sensors, each as part of an address; an empty one where none was. */
+function tokens(): string[] {
+  const entered = Object.entries(sessionStorage).filter(([key]) => key.startsWith("dtact token "));
+  if (entered.length === 0) return [""];
+  return entered.map(([, value]) => `?token=${encodeURIComponent(value as string)}`);
 }

@@ -340,7 +340,8 @@ export class Pane {
     this.camera.allow(this.sensor.mayControl);
     this.reconstruction.allow(this.sensor.mayControl);
     this.objects.allow();
-    this.pause(false);
+    // A recording may have been paused while it was opened.
+    if (!this.file) this.pause(false);
     this.servesPoints = hello.features.includes("cloud");
     if (this.servesPoints) return void this.lookAtPoints();
     this.lookAtMaps();

@@ -132,8 +132,9 @@ export class Player {
   }
 
   private async open(): Promise<void> {
+    let reader: McapIndexedReader | undefined;
     try {
-      const reader = await McapIndexedReader.Initialize({
+      reader = await McapIndexedReader.Initialize({
         readable: new FileBytes(this.file),
         decompressHandlers: { zstd: (bytes) => decompress(bytes) },
       });
@@ -143,9 +144,11 @@ export class Player {
         const names = topics.map(({ topic }) => topic).join(", ");
         throw new Error(`it has no frames of dtactd, only ${names || "no messages"}`);
       }
+      if (reader.chunkIndexes.length === 0) throw new Error("it has no frames");
       const times = reader.chunkIndexes.flatMap((chunk) => [chunk.messageStartTime, chunk.messageEndTime]);
       this.first = times.reduce((a, b) => (a < b ? a : b));
       this.last = times.reduce((a, b) => (a > b ? a : b));
+      this.at = this.first;
       this.reader = reader;
       const has = (wanted: string): boolean => topics.some(({ topic }) => topic === wanted);
       const features = ["reference"];
@@ -154,17 +157,19 @@ export class Player {
       this.post({ kind: "link", link: { state: "live", sentence: "Connected." } });
       const hello = { program: reader.header.library, features, rights: Rights.VIEW };
       this.post({ kind: "hello", hello: create(HelloReplySchema, hello) });
-      await this.play(this.first);
+      // It may have been paused while it was opened.
+      await this.seek(this.first);
     } catch (error) {
-      const whole = "A recording that was cut off is made whole by: mcap recover FILE -o WHOLE.mcap";
-      const sentence = `${this.file.name} cannot be played: ${words(error)}. ${this.reader ? "" : whole}`;
+      const whole = " A recording that was cut off is made whole by: mcap recover FILE -o WHOLE.mcap";
+      const sentence = `${this.file.name} cannot be played: ${words(error)}.${reader ? "" : whole}`;
       this.post({ kind: "link", link: { state: "ended", sentence } });
     }
   }
 
   /** What a topic's messages are from a time on, or from it back; damage is passed over. */
   private async *messages(topics: string[], from: bigint, reverse = false): AsyncGenerator<Message> {
-    const reader = this.reader as McapIndexedReader;
+    const { reader } = this;
+    if (!reader) return;
     for (let start = from; ; ) {
       let reached = start;
       try {
@@ -202,6 +207,8 @@ export class Player {
   }
 
   private async play(from: bigint): Promise<void> {
+    // Without a reader the file cannot be played, or is still being opened: open() plays it then.
+    if (!this.reader) return;
     const run = ++this.runs;
     this.ended = false;
     const began = performance.now();
