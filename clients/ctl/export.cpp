@@ -87,7 +87,10 @@ class Output {
 /// All maps as one array of (maps, rows, columns).
 class Stack {
  public:
-  explicit Stack(const fs::path& path) : output_(path) { output_.write(head()); }
+  /// The head comes in finish(), so that NumPy refuses a file that is not whole.
+  explicit Stack(const fs::path& path) : output_(path) {
+    output_.write(std::string(head().size(), '\0'));
+  }
   void add(const cli::DepthImage& depth, std::uint64_t frame) {
     if (maps_ > 0 && (depth.width != width_ || depth.height != height_)) {
       throw std::runtime_error(
@@ -281,7 +284,12 @@ void run_export(const cli::Context& context, const ExportOptions& options) {
   fs::create_directories(options.output);
   remove_earlier(options.output);
   Exporter exporter(options);
-  exporter.run(file);
+  try {
+    exporter.run(file);
+  } catch (...) {
+    remove_earlier(options.output);
+    throw;
+  }
   cli::RecordingReport report;
   report.set_output(options.output);
   report.set_frames(exporter.frames());

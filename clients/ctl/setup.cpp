@@ -329,10 +329,25 @@ class Setup {
     return true;
   }
 
+  /// Where guided goes on with a session that ended early. One that has its calibration is not
+  /// taken up again: its presses are of the gel of that time.
+  [[nodiscard]] std::string work_folder() const {
+    std::string name = "dtact-calibration";
+    if (const std::size_t at = options_.unit.find('@'); at != std::string::npos) {
+      name += "-" + options_.unit.substr(at + 1);
+    }
+    std::string folder = name;
+    for (int i = 2; std::filesystem::exists(std::filesystem::path(folder) / "calibration"); ++i) {
+      folder = fmt::format("{}-{}", name, i);
+    }
+    return folder;
+  }
+
   void calibrate() const {
     Command command = {cli::sibling("dtact-calibrate")};
     add_target(command);
     command.emplace_back("guided");
+    command.insert(command.end(), {"--folder", work_folder()});
     const auto add = [&command](const std::string& option, const std::string& value) {
       if (!value.empty()) command.insert(command.end(), {option, value});
     };
@@ -350,6 +365,7 @@ class Setup {
                 "distance: ");
       add(scale.find(',') == std::string::npos ? "--mm-per-px" : "--ruler", scale);
     }
+    if (!options_.lens.empty()) add("--mm-per-px", options_.mm_per_px);
     add("--ruler", options_.ruler);
     add("--lens", options_.lens);
     add("--crop", options_.crop);

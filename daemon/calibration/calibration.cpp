@@ -29,6 +29,8 @@ Calibration load(const fs::path& folder, const std::optional<FrameSize>& camera)
 
 void save(const Calibration& calibration, const fs::path& folder) {
   const Files files = format(calibration);
+  // What the daemon would refuse must not replace a calibration that it takes.
+  (void)parse(files.toml, files.reference_png, folder.string());
   base::write_folder_atomically(folder,
                                 {{kReferenceName, files.reference_png}, {kTomlName, files.toml}},
                                 {kTomlName, kReferenceName}, "a calibration");

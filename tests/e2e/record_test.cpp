@@ -285,7 +285,12 @@ TEST(RecordUncalibrated, GetsItsDepthFromFramesThatWereWithoutContact) {
                                               anew};
   EXPECT_EQ(run_program(reprocess, &said), 1);
   EXPECT_THAT(said, HasSubstr("say so by --reference-frames 32"));
+  base::write_file_atomically(anew, "an earlier one");
   auto with = reprocess;
+  with.emplace_back("--force");
+  EXPECT_EQ(run_program(with, &said), 1);
+  EXPECT_EQ(base::read_file(anew), "an earlier one");
+  with = reprocess;
   with.insert(with.end(), {"--reference-frames", "16", "--force"});
   ASSERT_EQ(run_program(with, &said), 0) << said;
   const mcap::Reader reader(anew);

@@ -93,6 +93,14 @@ void run(const Options& options, cli::Context& context) {
   const std::vector<Pair> pairs = measured(options, calibration);
   std::optional<double> thickness_mm = options.thickness_mm;
   if (!thickness_mm && calibration.gel) thickness_mm = calibration.gel->thickness_mm.value;
+  constexpr double kThinnestMm = 0.5;
+  constexpr double kThickestMm = 5;
+  if (thickness_mm && !(*thickness_mm >= kThinnestMm && *thickness_mm <= kThickestMm)) {
+    throw std::runtime_error(
+        fmt::format("{}: its gel is {:.2f} mm thick; force is calibrated for {} to {} mm: give "
+                    "--thickness-mm",
+                    options.calibration, *thickness_mm, kThinnestMm, kThickestMm));
+  }
   const Fit fit = fit_force(pairs, thickness_mm);
   auto model = std::make_shared<recon::Model>(*calibration.model);
   model->force = fit.model;

@@ -215,6 +215,13 @@ Pair ContactReader::measure_recording(const std::string& path, std::uint64_t fir
     if (std::ranges::find(frame.health(), v1::HEALTH_BEYOND_CALIBRATION) != frame.health().end()) {
       fail_beyond(fmt::format("{}:{}", path, at - 1));
     }
+    if (!map.data().empty() &&
+        (map.width() != frame.depth().width() || map.height() != frame.depth().height())) {
+      throw std::runtime_error(
+          fmt::format("{}:{}: its depth map has another size than those before: the resolution "
+                      "was changed meanwhile; take frames of one, {}:FIRST:END",
+                      path, at - 1, path));
+    }
     map = frame.depth();
     mean.add(client::values_of(map));
     return at < end;

@@ -32,8 +32,16 @@ std::optional<calibration::Crop> crop_of(const MapOptions& options, int width, i
   }
   const std::vector<int> centre =
       options.centre.empty() ? std::vector<int>{width / 2, height / 2} : options.centre;
-  return calibration::Crop{centre[0] - options.crop[0] / 2, centre[1] - options.crop[1] / 2,
-                           options.crop[0], options.crop[1]};
+  const calibration::Crop crop{centre[0] - options.crop[0] / 2, centre[1] - options.crop[1] / 2,
+                               options.crop[0], options.crop[1]};
+  if (crop.width < 1 || crop.height < 1 || crop.col < 0 || crop.row < 0 ||
+      crop.width > width - crop.col || crop.height > height - crop.row) {
+    throw std::runtime_error(
+        fmt::format("--crop: {}x{} around {},{} leaves the picture of {}x{}: make it smaller, or "
+                    "move --centre",
+                    crop.width, crop.height, centre[0], centre[1], width, height));
+  }
+  return crop;
 }
 
 calibration::LensFile lens_for(const std::string& path, int width, int height) {
@@ -74,7 +82,10 @@ double scale_of(const std::vector<double>& ruler, int width, int height) {
 /// Splits "FOLDER@0.8" into the images and the measured depth.
 std::pair<std::string, std::optional<double>> split_press(const std::string& text) {
   const std::size_t at = text.rfind('@');
-  if (at == std::string::npos) return {text, std::nullopt};
+  // One in a folder's name is no depth's.
+  if (at == std::string::npos || text.find('/', at) != std::string::npos || fs::exists(text)) {
+    return {text, std::nullopt};
+  }
   double depth_mm = 0;
   std::size_t read = 0;
   try {

@@ -70,12 +70,29 @@ image::Grey16 ImageSet::mean_q8() const {
   return mean;
 }
 
+namespace {
+
+/// A reference of a calibration or of a recording holds grey × 256, other images of 16 bits grey ×
+/// 257.
+bool is_reference(const fs::path& file, const std::string& bytes) {
+  const std::string name = file.filename();
+  return (name == "reference.png" || name == "current_reference.png") &&
+         image::png_header(bytes, file.string()).bits == 16;
+}
+
+}  // namespace
+
 ImageSet load_images(const std::vector<std::string>& paths, const std::string& option) {
   ImageSet set;
   for (const std::string& path : paths) {
     for (const fs::path& file : files_of(path, option)) {
       const std::string bytes = base::read_file(file);
       image::Grey16 image = image::decode_png_grey16(bytes, file.string());
+      if (is_reference(file, bytes)) {
+        std::ranges::transform(image.pixels, image.pixels.begin(), [](std::uint16_t q8) {
+          return static_cast<std::uint16_t>(std::min(65535, (q8 * 257 + 128) / 256));
+        });
+      }
       if (!set.images.empty() && (image.width != set.width() || image.height != set.height())) {
         throw std::runtime_error(fmt::format("{}: {} is {}x{} but {} is {}x{}", option,
                                              file.string(), image.width, image.height,

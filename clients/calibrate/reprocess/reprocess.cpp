@@ -47,6 +47,9 @@ bool measurable(const v1::Frame& frame) {
          !has(frame, v1::HEALTH_REFERENCE_STALE);
 }
 
+/// The file until it is whole: a failure, or Ctrl-C, leaves the one before.
+fs::path part_of(const std::string& output) { return output + ".part"; }
+
 class Reprocessor {
  public:
   Reprocessor(const Options& options, const cli::Context& context)
@@ -57,7 +60,7 @@ class Reprocessor {
         remaker_(calibration_),
         decoder_(frame_width(), frame_height()),
         luma_(frame_width(), frame_height()),
-        sink_(options.output, options.force),
+        sink_(part_of(options.output), true),
         writer_(sink_, {.program = context.target.program}) {}
 
   void run() {
@@ -84,6 +87,8 @@ class Reprocessor {
                                "without --no-jpeg, from a camera that delivers JPEG");
     }
     writer_.finish();
+    sink_.sync();
+    fs::rename(part_of(options_.output), options_.output);
   }
 
   /// See DepthReprocessor::unsharpened().
@@ -233,7 +238,7 @@ void run(const cli::Context& context, const Options& options) {
     reprocessor.run();
   } catch (...) {
     std::error_code ignored;
-    fs::remove(options.output, ignored);
+    fs::remove(part_of(options.output), ignored);
     throw;
   }
   const auto report = reprocessor.report();

@@ -120,6 +120,18 @@ TEST_F(Force, IsFittedIntoACalibrationOfItsOwn) {
   EXPECT_NEAR(force->zero_mm, 0, 0.005);
 }
 
+// The daemon would refuse it.
+TEST_F(Force, TheCalibrationStaysWhereItsGelIsTooThick) {
+  calibration::Calibration thick = calibration::load(at("cal"));
+  thick.gel.emplace();
+  thick.gel->thickness_mm.value = 7;
+  thick.gel->indentation = {0, 0.1, 0.2, 0.3, 0.4};
+  calibration::save(thick, at("cal"));
+  EXPECT_EQ(run({"force", "--calibration", at("cal"), "--pairs", readings()}), 1);
+  EXPECT_THAT(said_, HasSubstr("its gel is 7.00 mm thick; force is calibrated for 0.5 to 5 mm"));
+  EXPECT_FALSE(calibration::load(at("cal")).model->force);
+}
+
 TEST_F(Force, IsFittedInPlaceFromGrams) {
   const std::string grams = readings(1 / 0.00980665);
   EXPECT_EQ(run({"force", "--calibration", at("cal"), "--pairs", grams}), 1);

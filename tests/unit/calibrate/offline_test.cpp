@@ -172,6 +172,33 @@ TEST_F(Offline, CropIsAboutTheCentre) {
               ThrowsMessage<std::runtime_error>(HasSubstr("--crop")));
 }
 
+TEST_F(Offline, RefusesACropBeyondThePicture) {
+  for (const auto& [crop, centre] :
+       {std::pair{"900,600", "130,120"}, {"100,100", "20,120"}, {"100,100", "130,219"}}) {
+    EXPECT_THAT([&] { (void)run(with(calibrate(), "--crop", crop, "--centre", centre)); },
+                ThrowsMessage<std::runtime_error>(HasSubstr("leaves the picture of 260x240")));
+  }
+  EXPECT_FALSE(fs::exists(at("cal")));
+}
+
+TEST_F(Offline, AnAtInAFoldersNameIsNoDepth) {
+  fs::create_directories(at("cal@left/press@01"));
+  write("cal@left/press@01/00.png", Ball{}.frame());
+  const std::string folder = "cal@left/press@01";
+  for (const std::string& press : {folder, folder + "@" + std::to_string(Ball{}.depth_mm)}) {
+    (void)run({"depth", "--reference", at("reference.png"), "--press", at(press), "--radius-mm",
+               "4.0", "--mm-per-px", "0.05", "--camera-mm", "1000", "-o", at("cal")});
+    EXPECT_EQ(calibration::load(at("cal")).origin.sources.size(), 2U) << press;
+  }
+}
+
+// Its 16 bits hold grey × 256, those of other images grey × 257.
+TEST_F(Offline, ReadsTheReferenceOfACalibration) {
+  (void)run(calibrate());
+  EXPECT_EQ(load_images({at("cal/reference.png")}, "--reference").mean_q8().pixels,
+            calibration::load(at("cal")).model->reference_q8);
+}
+
 TEST_F(Offline, AFolderStandsForItsImages) {
   fs::create_directory(at("frames"));
   image::Grey8 image = Ball{}.reference_image();

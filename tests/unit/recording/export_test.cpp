@@ -128,9 +128,28 @@ TEST_F(Export, ForceReplacesAnEarlierExport) {
   EXPECT_TRUE(fs::exists(out_ / "depth-notes.png"));
 }
 
+// NumPy would load the beginning of a stack as one without maps.
+TEST_F(Export, LeavesNoStackThatIsNotWhole) {
+  mcap::FileSink sink(file_, true);
+  RecordingWriter writer(sink, {.program = "test"});
+  writer.add(sample_frame(10));
+  v1::Frame other = sample_frame(11);
+  other.mutable_depth()->set_width(2);
+  other.mutable_depth()->set_height(3);
+  other.mutable_depth()->set_full_width(2);
+  other.mutable_depth()->set_full_height(3);
+  writer.add(other);
+  writer.finish();
+  EXPECT_EQ(run({"--to", "npy"}), 1);
+  EXPECT_THAT(said_, HasSubstr("export them apart by --frames"));
+  EXPECT_TRUE(fs::is_empty(out_));
+}
+
 TEST_F(Export, SaysWhatIsWrong) {
   EXPECT_EQ(run({"--to", "npy", "--frames", "9:"}), 1);
   EXPECT_THAT(said_, HasSubstr("of its 5 frames none is among --frames 9:"));
+  EXPECT_TRUE(fs::is_empty(out_));
+  EXPECT_EQ(run({"--to", "npy"}), 0);
   EXPECT_EQ(run({"--to", "npy"}), 1);
   EXPECT_THAT(said_, HasSubstr("is not empty"));
   EXPECT_EQ(run({"--to", "npy", "--force"}), 0);
