@@ -38,8 +38,11 @@ bool is_own_host(std::string_view host, const std::vector<std::string>& names) {
 
 bool is_own_origin(std::string_view origin, std::string_view host, bool tls,
                    const std::vector<std::string>& others) {
-  const std::string_view scheme = tls ? "https://" : "http://";
-  if (origin.starts_with(scheme) && iequals(origin.substr(scheme.size()), host)) return true;
+  // A proxy may end TLS before this gateway.
+  for (const std::string_view scheme : {"https://", "http://"}) {
+    if (tls && scheme == "http://") continue;
+    if (origin.starts_with(scheme) && iequals(origin.substr(scheme.size()), host)) return true;
+  }
   return std::ranges::find(others, origin) != others.end();
 }
 

@@ -161,10 +161,12 @@ void Source::request(v1::ClientMessage message, const std::string& identity, Ans
 }
 
 std::string Source::no_room_for(const Subscriber& subscriber) const {
-  // The stream that it leaves for the new one does not count.
+  // The stream that it leaves for the new one does not count. It leaves one that the daemon has
+  // agreed to: others that it asked for are still being opened.
   const auto stays = [&](const Stream& stream) {
-    return std::ranges::any_of(stream.members,
-                               [&](const Member& member) { return member.who != subscriber.who; });
+    return !stream.agreed || std::ranges::any_of(stream.members, [&](const Member& member) {
+      return member.who != subscriber.who;
+    });
   };
   const auto all = static_cast<std::size_t>(std::ranges::count_if(streams_, stays));
   const auto own = static_cast<std::size_t>(std::ranges::count_if(

@@ -218,6 +218,15 @@ test("a calibration is uploaded, used and left again; a bad one is refused in wo
     (text) => text.includes("Choose both calibration.toml and reference.png"),
     10_000,
   );
+  await picker.setInputFiles([
+    { name: "calibration.toml", mimeType: "text/plain", buffer: Buffer.from("") },
+    { name: "reference.png", mimeType: "image/png", buffer: Buffer.alloc(2 ** 24) },
+  ]);
+  await until(
+    () => panel.locator(".answer").textContent(),
+    (text) => text.includes("too large"),
+    10_000,
+  );
 });
 
 test("a token that may watch sees no control that would fail", async () => {
@@ -230,6 +239,14 @@ test("a token that may watch sees no control that would fail", async () => {
     await form.getByLabel("Token").fill("wrong");
     await form.getByRole("button").click();
     await form.waitFor({ state: "hidden" });
+    await form.waitFor();
+    await form.getByLabel("Token").fill("x".repeat(300));
+    await form.getByRole("button").click();
+    await until(
+      () => watching.page.locator(".pane .notice").textContent(),
+      (text) => text.includes("hello.token"),
+      10_000,
+    );
     await form.waitFor();
     await form.getByLabel("Token").fill(token);
     await form.getByRole("button").click();

@@ -47,7 +47,11 @@ void SensorTopics::update() {
   source_->subscribe(
       {.who = this, .owner = "Foxglove", .may_control = true}, request,
       [this](const v1::Reply& reply) {
-        if (!reply.has_error()) return;
+        if (!reply.has_error()) {
+          if (std::exchange(refused_, false)) publish_state(true, "");
+          return;
+        }
+        refused_ = true;
         asked_.clear();
         publish_state(false, reply.error().message());
       },

@@ -51,7 +51,8 @@ class SensorTopics {
 
   std::shared_ptr<Source> source_;
   std::map<Listener*, Topics> listeners_;
-  std::string asked_;  ///< The Subscribe that the daemon knows, serialized.
+  std::string asked_;     ///< The Subscribe that the daemon knows, serialized.
+  bool refused_ = false;  ///< The last one was.
   std::shared_ptr<const Message> light_;
   bool points_shown_ = false;  ///< The last points were some.
 };

@@ -31,11 +31,11 @@ TEST(Hosts, NamesThatOthersChoose) {
 TEST(Origins, TheOneThatThePageCameFrom) {
   EXPECT_TRUE(is_own_origin("http://localhost:7380", "localhost:7380", false, {}));
   EXPECT_TRUE(is_own_origin("https://Gripper", "gripper", true, {}));
+  EXPECT_TRUE(is_own_origin("https://robot.example", "robot.example", false, {}));
   EXPECT_TRUE(is_own_origin("file://", "localhost:7380", false, {"file://"}));
 }
 
 TEST(Origins, AnyOther) {
-  EXPECT_FALSE(is_own_origin("https://localhost:7380", "localhost:7380", false, {}));
   EXPECT_FALSE(is_own_origin("http://localhost:7380", "localhost:7380", true, {}));
   EXPECT_FALSE(is_own_origin("http://localhost", "localhost:7380", false, {}));
   EXPECT_FALSE(is_own_origin("http://127.0.0.1:7380", "localhost:7380", false, {}));

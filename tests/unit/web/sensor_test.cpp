@@ -88,6 +88,33 @@ TEST(Source, WithoutDescriptorsRefusesASubscription) {
   source->stop();
 }
 
+// Each is a thread and a client of the daemon, before the daemon has answered, too.
+TEST(Source, SubscriptionsThatAreBeingOpenedCount) {
+  PlayedDaemon daemon({[](Peer& peer) {
+    peer.greet();
+    (void)peer.ends_silently();
+  }});
+  boost::asio::io_context io;
+  const auto source = std::make_shared<Source>(io, "left", daemon.options);
+  source->start();
+  run_until(io, [&] { return source->connected(); });
+  ASSERT_TRUE(source->connected());
+  v1::Reply answer;
+  for (std::size_t i = 0; i <= Source::kMaxFeedsOfOne; ++i) {
+    EXPECT_FALSE(answer.has_error()) << i;
+    v1::Subscribe request;
+    request.set_summary(true);
+    request.set_summary_hz(1 + static_cast<double>(i));
+    source->subscribe(
+        {.who = &io, .owner = "test", .may_control = true}, request,
+        [&](const v1::Reply& reply) { answer = reply; }, [](const RelayedFrame&, std::uint64_t) {});
+  }
+  EXPECT_EQ(answer.error().code(), v1::ERROR_BUSY);
+  EXPECT_TRUE(answer.error().message().starts_with("test has 5 different subscriptions to left"))
+      << answer.error().message();
+  source->stop();
+}
+
 // Before: the exception ended the program, which found the same daemons again.
 TEST(Server, WithoutDescriptorsLeavesOutWhatIsFound) {
   boost::asio::io_context io;

@@ -1,6 +1,7 @@
 // The fleet: all sensors of the gateway with state, rate, version and health; each can be opened.
 import "./fleet.css";
 import { button, el, say } from "./dom";
+import { keptTokens } from "./kept";
 import { fixed } from "./labels";
 
 interface Status {
@@ -126,7 +127,7 @@ export class Fleet {
 
 /** The tokens that were entered for sensors, each as part of an address; an empty one where none was. */
 function tokens(): string[] {
-  const entered = Object.entries(sessionStorage).filter(([key]) => key.startsWith("dtact token "));
+  const entered = keptTokens();
   if (entered.length === 0) return [""];
-  return entered.map(([, value]) => `?token=${encodeURIComponent(value as string)}`);
+  return entered.map((token) => `?token=${encodeURIComponent(token)}`);
 }

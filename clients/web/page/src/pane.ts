@@ -3,6 +3,7 @@ import { create } from "@bufbuild/protobuf";
 import { GetReferenceSchema, State } from "../gen/dtact_pb";
 import type { Event, HelloReply, Status } from "../gen/dtact_pb";
 import { button, Choice, el, say } from "./dom";
+import { keepToken, keptToken } from "./kept";
 import { Meter } from "./meter";
 import { CalibrationsPanel } from "./panels/calibrations";
 import { CameraPanel } from "./panels/camera";
@@ -30,8 +31,7 @@ const REPORT_MS = 100;
 
 const KEYS_OF_POINTS = [" ", "ArrowLeft", "ArrowRight"];
 
-/** The words of a token stay with this window alone, and end with it. */
-const tokenKey = (name: string): string => `dtact token ${name}`;
+const NO_REFERENCE = "No reference: ";
 
 export class Pane {
   readonly element: HTMLElement;
@@ -92,7 +92,7 @@ export class Pane {
     this.tools = new Choice<Tool>("Tool", { point: "Point", line: "Line" }, "point", (tool) =>
       this.stage.use(tool),
     );
-    this.sensor = new Sensor(name, sessionStorage.getItem(tokenKey(name)) ?? "", this.wants(), {
+    this.sensor = new Sensor(name, keptToken(name), this.wants(), {
       link: (link) => this.link(link),
       hello: (hello) => this.hello(hello),
       frame: (frame) => this.show(frame),
@@ -228,7 +228,7 @@ export class Pane {
     );
     form.addEventListener("submit", (event) => {
       event.preventDefault();
-      sessionStorage.setItem(tokenKey(this.name), input.value);
+      keepToken(this.name, input.value);
       form.hidden = true;
       this.sensor.useToken(input.value);
       input.value = "";
@@ -273,8 +273,9 @@ export class Pane {
       const rgba = context?.getImageData(0, 0, width, height).data;
       const values = new Uint8Array(width * height).map((_, i) => rgba?.[4 * i] ?? 0);
       this.stage.reference = { width, height, values };
+      if (this.notice.textContent?.startsWith(NO_REFERENCE)) this.showNotice("");
     } catch (error) {
-      this.showNotice(`No reference: ${(error as Error).message}`);
+      this.showNotice(NO_REFERENCE + (error as Error).message);
     }
   }
 

@@ -9,10 +9,15 @@ import {
 import type { StoredCalibration } from "../../gen/dtact_pb";
 import { button, el, panel, say } from "../dom";
 import type { Sensor } from "../session/sensor";
+import { MAX_MESSAGE_BYTES } from "../wire/framing";
 import { Guide } from "./guide";
 import type { MapShape } from "./guide";
 
 const FILES = ["calibration.toml", "reference.png"];
+/** Both files travel in one message, beside the calibration's name. */
+const MAX_FILES_BYTES = MAX_MESSAGE_BYTES - 1024;
+
+const read = async (file: File): Promise<Uint8Array> => new Uint8Array(await file.arrayBuffer());
 
 export class CalibrationsPanel {
   private readonly list = el("ul", { class: "calibrations" });
@@ -129,14 +134,13 @@ export class CalibrationsPanel {
     const [toml, png] = FILES.map((name) => files.find((file) => file.name === name));
     this.picker.value = "";
     if (!toml || !png) return this.tell(`Choose both ${FILES.join(" and ")} of the folder.`);
+    if (toml.size + png.size > MAX_FILES_BYTES)
+      return this.tell("These files are too large for a calibration: 16 MiB together at most.");
     // The browser does not reveal the folder's name, so the time becomes the name.
     const name = `web-${new Date().toISOString().slice(0, 19).replaceAll(":", "")}`;
-    const [calibrationToml, referencePng] = await Promise.all(
-      [toml, png].map(async (file) => new Uint8Array(await file.arrayBuffer())),
-    );
-    if (!calibrationToml || !referencePng) return;
     let removed = "";
     await this.change("Uploading.", async () => {
+      const [calibrationToml, referencePng] = await Promise.all([read(toml), read(png)]);
       const result = await this.sensor.request({
         case: "uploadCalibration",
         value: create(UploadCalibrationSchema, { name, calibrationToml, referencePng }),

@@ -18,6 +18,8 @@ const FIRST_WAIT_MS = 500;
 const LONGEST_WAIT_MS = 8000;
 /** A server that says nothing at all for so long is taken for gone; status is asked once a second. */
 const SILENCE_MS = 10_000;
+/** Errors before HelloReply that another token fixes: this one is wrong or too long. */
+const TOKEN_ERRORS = [ErrorCode.ERROR_DENIED, ErrorCode.ERROR_INVALID, ErrorCode.ERROR_TOO_LARGE];
 /** A field of ServerMessage's that is a Frame, as protobuf's tag byte: field 2, length-delimited. */
 const FRAME_TAG = 0x12;
 
@@ -34,6 +36,8 @@ export class Connection {
   /** Whether the gateway has the sensor itself, and why not. */
   private reached = true;
   private why = "";
+  /** Why the newest subscription was refused; undefined where it was not. */
+  private refusal: string | undefined;
   /** Said last by the other end before it ended the connection. */
   private lastWord: string | undefined;
   /** The newest frame not decoded yet; it replaces an older one. */
@@ -70,6 +74,13 @@ export class Connection {
     return true;
   }
 
+  /** Shows a refused subscription with the link; undefined: it was accepted. */
+  showRefusal(refusal: string | undefined): void {
+    if (refusal === this.refusal) return;
+    this.refusal = refusal;
+    this.tell();
+  }
+
   private connect(): void {
     clearTimeout(this.timer);
     this.drop();
@@ -96,6 +107,7 @@ export class Connection {
     const socket = this.socket;
     this.socket = undefined;
     this.ready = false;
+    this.refusal = undefined;
     this.pending = undefined;
     if (socket) {
       socket.onopen = socket.onmessage = socket.onclose = null;
@@ -144,8 +156,12 @@ export class Connection {
     if (!this.ready) return;
     const why = this.why && `: ${this.why}`;
     const away = `The sensor is away${why}. It goes on by itself when it is back.`;
+    const live =
+      this.refusal === undefined
+        ? "Connected."
+        : `The subscription was refused: ${this.refusal}. Asking again every few seconds.`;
     this.listener.link(
-      this.reached ? { state: "live", sentence: "Connected." } : { state: "away", sentence: away },
+      this.reached ? { state: "live", sentence: live } : { state: "away", sentence: away },
     );
   }
 
@@ -197,7 +213,7 @@ export class Connection {
     }
     if (reply.result.case !== "error") return;
     const { code, message } = reply.result.value;
-    if (code === ErrorCode.ERROR_DENIED && !this.ready) {
+    if (TOKEN_ERRORS.includes(code) && !this.ready) {
       this.drop();
       this.listener.link({ state: "token", sentence: message });
     } else if (code === ErrorCode.ERROR_VERSION) {

@@ -23,6 +23,8 @@ const LUMA_HZ = { nearby: 20, afar: 5 };
 const CLOUD_HZ = { nearby: 30, afar: 10 };
 /** What is asked from here must not be mistaken for a request of the page, whose ids count up from 1. */
 const OWN_IDS = 2 ** 41;
+/** Until a refused subscription is asked for again. */
+const RETRY_MS = 5000;
 const LOST = "The connection was lost.";
 
 class Session {
@@ -37,6 +39,7 @@ class Session {
   private nextId = OWN_IDS;
   private features: string[] = [];
   private subscribed: Promise<Reply | undefined> | undefined;
+  private retry: ReturnType<typeof setTimeout> | undefined;
   /** The page has not taken the last frame yet. */
   private underWay = false;
   private waiting: WireFrame | undefined;
@@ -103,7 +106,11 @@ class Session {
   }
 
   private showLink(link: Link): void {
-    if (link.state !== "live") this.stopRecording(LOST);
+    if (link.state !== "live") {
+      this.stopRecording(LOST);
+      // Once the sensor is back, greet() subscribes.
+      clearTimeout(this.retry);
+    }
     post({ kind: "link", link });
   }
 
@@ -188,7 +195,17 @@ class Session {
       (reply) => (this.subscribed === answer ? reply : this.subscribed),
     );
     this.subscribed = answer;
+    clearTimeout(this.retry);
+    void answer.then((reply) => {
+      if (reply && this.subscribed === answer) this.takeSubscribed(reply);
+    });
     return answer;
+  }
+
+  private takeSubscribed(reply: Reply): void {
+    const refusal = reply.result.case === "error" ? reply.result.value.message : undefined;
+    if (refusal !== undefined) this.retry = setTimeout(() => void this.subscribe(), RETRY_MS);
+    this.connection.showRefusal(refusal);
   }
 
   private maps(): MessageInitShape<typeof SubscribeSchema> {

@@ -206,7 +206,7 @@ export class MapCanvas {
     });
     canvas.addEventListener("webglcontextrestored", () => {
       this.graphics = prepare(gl);
-      this.redraw();
+      this.refill();
     });
   }
 
@@ -227,6 +227,16 @@ export class MapCanvas {
     if (!this.last || !this.graphics) return;
     if ("depth" in this.last) this.paintDepth(this.last.depth);
     else this.paintLuma(this.last.luma);
+  }
+
+  /** Draws the last map into new textures, unless its memory has gone back to the worker. */
+  private refill(): void {
+    if (!this.last) return;
+    if ("depth" in this.last) {
+      if (this.last.depth.values.length > 0) this.drawDepth(this.last.depth);
+    } else if (this.last.luma.values.length > 0) {
+      this.drawLuma(this.last.luma);
+    }
   }
 
   private resize(width: number, height: number): void {
