@@ -2,6 +2,7 @@
 """Checks that names and text use the project's vocabulary: words.txt lists what is refused and what to write instead."""
 import pathlib
 import re
+import shutil
 import subprocess
 import sys
 
@@ -67,9 +68,10 @@ def complaints(path, text, rules):
 
 
 def tracked(top):
-    listed = subprocess.run(["git", "-C", str(top), "ls-files", "-z"], capture_output=True, text=True, check=False)
-    if listed.returncode == 0:
-        return [name for name in listed.stdout.split("\0") if name]
+    if shutil.which("git"):
+        listed = subprocess.run(["git", "-C", str(top), "ls-files", "-z"], capture_output=True, text=True, check=False)
+        if listed.returncode == 0:
+            return [name for name in listed.stdout.split("\0") if name]
     return [str(path.relative_to(top)) for path in sorted(top.rglob("*"))  # a source archive
             if path.is_file() and not str(path.relative_to(top)).startswith(("build/", "."))]
 

@@ -30,7 +30,7 @@ def _long_residuals(second: NDArray[np.uint8]) -> NDArray[np.uint16]:
     """The residuals of 15 and more: a byte of residual − 15, or 255 and 16 bits."""
     # 255 is also found within the 16 bits of others: from each one that counts to the next.
     marks = np.flatnonzero(second == 255)
-    following = np.searchsorted(marks, marks + 3).tolist()
+    following = [int(mark) for mark in np.searchsorted(marks, marks + 3)]
     counting = []
     i = 0
     while i < len(following):

@@ -27,7 +27,8 @@ def _slope(depth: NDArray[np.float32], step: float, reach: int) -> NDArray[np.fl
         end[:, :-i][right] = depth[:, i:][right]
         far[1][:, :-i][right] = i
     distance = far.sum(axis=0) * step
-    slope = np.divide(end - begin, distance, out=np.full(depth.shape, np.nan), where=distance > 0)
+    slope: NDArray[np.float64] = np.full(depth.shape, np.nan)
+    np.divide(end - begin, distance, out=slope, where=distance > 0)
     slope[np.isnan(depth)] = np.nan
     return slope
 

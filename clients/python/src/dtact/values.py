@@ -47,9 +47,10 @@ class Contact:
 
     @classmethod
     def of(cls, m: Message) -> Contact:
-        force = (m.force_n, m.force_uncertainty_n) if m.HasField("force_n") else (None, None)
+        valid = m.HasField("force_n")
         return cls(m.in_contact, m.area_mm2, m.x_mm, m.y_mm, m.deepest_mm, m.deepest_x_mm,
-                   m.deepest_y_mm, m.volume_mm3, *force,
+                   m.deepest_y_mm, m.volume_mm3, m.force_n if valid else None,
+                   m.force_uncertainty_n if valid else None,
                    name_of("ForceAbsence", m.force_absence, "FORCE_ABSENCE_"), m.threshold_mm)
 
 
