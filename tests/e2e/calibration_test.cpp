@@ -242,8 +242,8 @@ TEST_F(TwoCalibrations, ADaemonWhoseUploadedOneIsDamagedStartsAndCanBeFixed) {
   EXPECT_TRUE(depth_flows_again_at(kConfigured));
 }
 
-// SIGKILL in the middle of a start stands for a calibration that ends the daemon, or is so large that
-// systemd does. A start that has got past it does not count, and the counting begins again.
+// SIGKILL in the middle of a start stands for a calibration that ends the daemon, or is so large
+// that systemd does. A start that has got past it does not count, and the counting begins again.
 TEST_F(TwoCalibrations, ADaemonThatOneKeepsFromStartingBeginsWithTheConfiguredOne) {
   ASSERT_EQ(sensor_.daemon->stop(SIGTERM), 0);
   std::vector<std::string> command = sensor_.arguments;
