@@ -169,6 +169,12 @@ test("depth is made as the panel says, and its worth and time are on the chart",
     .getByRole("radio", { name: "Off" });
   assert.equal(await off.getAttribute("aria-checked"), "true");
   await panel.getByRole("radio", { name: "Full" }).click();
+  // Until it is made, the daemon refuses an upload as busy.
+  await until(
+    () => status(left).reconstruction.resolution,
+    (resolution) => resolution === "full",
+    10_000,
+  );
 });
 
 test("a calibration is uploaded, used and left again; a bad one is refused in words", async () => {
