@@ -74,6 +74,7 @@ class ReferenceTrackerTest : public ::testing::Test {
   PipelineConfig config_ = config();
   fakes::ToyScene scene_{.marks = 2};
   CalibratedImage calibrated_{fakes::toy_calibration(scene_)};
+  CalibratedImage next_{fakes::toy_calibration(scene_)};
   std::filesystem::path folder_ = fakes::own_path();
   LightTimeline light_{config_.light, 0, kPeriodNs};
   ReferenceTracker image_{fakes::kToyWidth, fakes::kToyHeight, light_, config_};
@@ -93,14 +94,13 @@ TEST_F(ReferenceTrackerTest, AnotherLightThanAtCalibrationIsReportedFromTheStart
 
 TEST_F(ReferenceTrackerTest, TheLightThatIsFollowedOutlivesTheCalibration) {
   ASSERT_TRUE(settles());
-  CalibratedImage next{fakes::toy_calibration(scene_)};
   constexpr int kDriftFrames = 1200;  // half a percent in twenty seconds
   for (int i = 1; i <= kDriftFrames; ++i) {
     scene_.light = 1 - 0.005 * i / kDriftFrames;
     show(1);
   }
   ASSERT_NEAR(image_.light(), 0.995, 0.001);
-  image_.use(&next);
+  image_.use(&next_);
   EXPECT_NEAR(image_.light(), 0.995, 0.001);
   show(2 * kReferenceFrames);
   EXPECT_NEAR(image_.light(), 0.995, 0.001);

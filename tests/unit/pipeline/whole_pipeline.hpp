@@ -87,8 +87,10 @@ class PipelineTest : public ::testing::Test {
   /// Sends a command and waits for its answer.
   CommandDone ask(decltype(Command::what) what) {
     const auto answer = std::make_shared<std::optional<CommandDone>>();
-    EXPECT_TRUE(
-        pipeline->submit({std::move(what), [answer](const CommandDone& done) { *answer = done; }}));
+    EXPECT_TRUE(pipeline->submit({std::move(what), [answer](const CommandDone& done) {
+                                    *answer = done;
+                                    (*answer)->command.then = nullptr;  // it holds the answer
+                                  }}));
     EXPECT_TRUE(until([&] { return answer->has_value(); }));
     return answer->value_or(CommandDone{});
   }

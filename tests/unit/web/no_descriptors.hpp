@@ -4,6 +4,14 @@
 
 namespace dtact::web::test {
 
+/// The undefined-behaviour sanitizer looks at memory through a pipe: without one it takes every
+/// object for damaged.
+#ifdef __SANITIZE_ADDRESS__
+inline constexpr bool kNeedsDescriptors = true;
+#else
+inline constexpr bool kNeedsDescriptors = false;
+#endif
+
 /// While an object of this class lives, the program can open no descriptor.
 class NoDescriptors {
  public:

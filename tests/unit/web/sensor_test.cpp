@@ -64,6 +64,7 @@ TEST(Sensor, ShowsNoOldStatus) {
 }
 
 TEST(Source, WithoutDescriptorsRefusesASubscription) {
+  if (test::kNeedsDescriptors) GTEST_SKIP() << "the sanitizer needs descriptors";
   PlayedDaemon daemon({[](Peer& peer) {
     peer.greet();
     (void)peer.ends_silently();
@@ -117,6 +118,7 @@ TEST(Source, SubscriptionsThatAreBeingOpenedCount) {
 
 // Before: the exception ended the program, which found the same daemons again.
 TEST(Server, WithoutDescriptorsLeavesOutWhatIsFound) {
+  if (test::kNeedsDescriptors) GTEST_SKIP() << "the sanitizer needs descriptors";
   boost::asio::io_context io;
   std::string log;
   Settings settings;
