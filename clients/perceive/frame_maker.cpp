@@ -51,7 +51,7 @@ void FrameMaker::begin(v1::Frame frame, Wanted wanted) {
   if (gone) release();
   if (!wanted.pose) release_pose();
   if (wanted.pose && depth_) follow(*depth_, frame_.depth().uncertainty_um());
-  // A first map may be coarser than the network's; the next one is not.
+  // A first map may be coarser than the network's cells, and so may those of a coarse resolution.
   const bool fine = frame_.depth().mm_per_px() <= TouchMap::kCellMm;
   if (wanted.recognition && depth_ && depth_->is_whole() && fine) {
     if (!recognition_) recognition_ = std::make_unique<RecognitionThread>(taught_);

@@ -30,6 +30,14 @@ std::vector<fs::path> files_of(const fs::path& path, const std::string& option) 
   return files;
 }
 
+/// A reference of a calibration or of a recording holds grey × 256, other images of 16 bits grey ×
+/// 257.
+bool is_reference(const fs::path& file, const std::string& bytes) {
+  const std::string name = file.filename();
+  return (name == "reference.png" || name == "current_reference.png") &&
+         image::png_header(bytes, file.string()).bits == 16;
+}
+
 }  // namespace
 
 std::pair<int, int> pair_of(const std::string& text, const char* option) {
@@ -69,18 +77,6 @@ image::Grey16 ImageSet::mean_q8() const {
   }
   return mean;
 }
-
-namespace {
-
-/// A reference of a calibration or of a recording holds grey × 256, other images of 16 bits grey ×
-/// 257.
-bool is_reference(const fs::path& file, const std::string& bytes) {
-  const std::string name = file.filename();
-  return (name == "reference.png" || name == "current_reference.png") &&
-         image::png_header(bytes, file.string()).bits == 16;
-}
-
-}  // namespace
 
 ImageSet load_images(const std::vector<std::string>& paths, const std::string& option) {
   ImageSet set;

@@ -33,6 +33,24 @@ void run_until(boost::asio::io_context& io, Done done) {
   while (!done() && steady_clock::now() < end) io.run_for(std::chrono::milliseconds(10));
 }
 
+/// A source whose daemon says nothing after its greeting.
+struct Connected {
+  Connected() {
+    source->start();
+    run_until(io, [this] { return source->connected(); });
+  }
+  ~Connected() { source->stop(); }
+  Connected(const Connected&) = delete;
+  Connected& operator=(const Connected&) = delete;
+
+  PlayedDaemon daemon{{[](Peer& peer) {
+    peer.greet();
+    (void)peer.ends_silently();
+  }}};
+  boost::asio::io_context io;
+  std::shared_ptr<Source> source = std::make_shared<Source>(io, "left", daemon.options);
+};
+
 // Before: what somebody had asked for hours ago.
 TEST(Sensor, ShowsNoOldStatus) {
   PlayedDaemon daemon({[](Peer& peer) {
@@ -65,14 +83,8 @@ TEST(Sensor, ShowsNoOldStatus) {
 
 TEST(Source, WithoutDescriptorsRefusesASubscription) {
   if (test::kNeedsDescriptors) GTEST_SKIP() << "the sanitizer needs descriptors";
-  PlayedDaemon daemon({[](Peer& peer) {
-    peer.greet();
-    (void)peer.ends_silently();
-  }});
-  boost::asio::io_context io;
-  const auto source = std::make_shared<Source>(io, "left", daemon.options);
-  source->start();
-  run_until(io, [&] { return source->connected(); });
+  Connected connected;
+  const auto& source = connected.source;
   ASSERT_TRUE(source->connected());
   v1::Subscribe request;
   request.set_summary(true);
@@ -86,19 +98,12 @@ TEST(Source, WithoutDescriptorsRefusesASubscription) {
   EXPECT_EQ(answer.error().code(), v1::ERROR_BUSY);
   EXPECT_TRUE(answer.error().message().starts_with("no more subscriptions to left are made: "))
       << answer.error().message();
-  source->stop();
 }
 
 // Each is a thread and a client of the daemon, before the daemon has answered, too.
 TEST(Source, SubscriptionsThatAreBeingOpenedCount) {
-  PlayedDaemon daemon({[](Peer& peer) {
-    peer.greet();
-    (void)peer.ends_silently();
-  }});
-  boost::asio::io_context io;
-  const auto source = std::make_shared<Source>(io, "left", daemon.options);
-  source->start();
-  run_until(io, [&] { return source->connected(); });
+  Connected connected;
+  const auto& source = connected.source;
   ASSERT_TRUE(source->connected());
   v1::Reply answer;
   for (std::size_t i = 0; i <= Source::kMaxFeedsOfOne; ++i) {
@@ -107,13 +112,12 @@ TEST(Source, SubscriptionsThatAreBeingOpenedCount) {
     request.set_summary(true);
     request.set_summary_hz(1 + static_cast<double>(i));
     source->subscribe(
-        {.who = &io, .owner = "test", .may_control = true}, request,
+        {.who = &connected, .owner = "test", .may_control = true}, request,
         [&](const v1::Reply& reply) { answer = reply; }, [](const RelayedFrame&, std::uint64_t) {});
   }
   EXPECT_EQ(answer.error().code(), v1::ERROR_BUSY);
   EXPECT_TRUE(answer.error().message().starts_with("test has 5 different subscriptions to left"))
       << answer.error().message();
-  source->stop();
 }
 
 // Before: the exception ended the program, which found the same daemons again.
