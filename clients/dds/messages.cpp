@@ -173,8 +173,9 @@ void PointWriter::write(dds_entity_t writer, const Header& header, const v1::Fra
       const auto row =
           cloud_.y + static_cast<int>(i / static_cast<std::size_t>(cloud_.width)) * cloud_.stride -
           grid.y;
-      const double mm =
-          1e-3 * map.um_per_unit() * depths[static_cast<std::size_t>(row * grid.width + column)];
+      const auto at = static_cast<std::size_t>(row) * static_cast<std::size_t>(grid.width) +
+                      static_cast<std::size_t>(column);
+      const double mm = 1e-3 * map.um_per_unit() * depths[at];
       if (!all && mm < min_mm) continue;
       for (std::size_t part = 0; part < perceive::PointCloud::kParts; ++part) {
         values.push_back(cloud_.values[part * cloud_.size() + i]);
@@ -190,6 +191,7 @@ void write_contact(dds_entity_t writer, const Header& header, const v1::Frame& f
   const v1::Contact& contact = frame.contact();
   const std::vector<std::string> flags = client::names_of(frame.health());
   std::vector<char*> health;
+  health.reserve(flags.size());
   for (const std::string& flag : flags) health.push_back(text(flag));
   const std::string absence = frame.has_contact()
                                   ? ""

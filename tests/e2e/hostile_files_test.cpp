@@ -34,7 +34,7 @@ v1::UploadCalibration upload_with(const v1::CalibrationFiles& files, const std::
   upload.set_name("hostile");
   upload.set_reference_png(png);
   const std::string digest = '"' + calibration::sha256_hex(png) + '"';
-  std::string toml = files.calibration_toml();
+  const std::string& toml = files.calibration_toml();
   const std::size_t reference = toml.find("[reference]");
   upload.set_calibration_toml(toml.substr(0, reference) +
                               with_value(toml.substr(reference), "sha256", digest));
@@ -124,10 +124,12 @@ TEST_F(HostileFiles, AFileIsOnlySoWide) {
   v1::UploadCalibration upload;
   upload.set_name("wide");
   upload.set_reference_png("no PNG");
+  std::string long_value;
+  long_value.resize(15'900'000, 'x');
   for (const std::string& toml : {fakes::wide_toml(15'900'000), fakes::many_keys_toml(15'900'000),
-                                  "a = \"" + std::string(15'900'000, 'x') + "\"\n",
-                                  fakes::wide_toml(4'000'000), fakes::many_keys_toml(4'000'000),
-                                  fakes::wide_toml(520'000), fakes::many_keys_toml(300'000)}) {
+                                  "a = \"" + long_value + "\"\n", fakes::wide_toml(4'000'000),
+                                  fakes::many_keys_toml(4'000'000), fakes::wide_toml(520'000),
+                                  fakes::many_keys_toml(300'000)}) {
     upload.set_calibration_toml(toml);
     EXPECT_THAT(refusal(upload), HasSubstr("upload wide:"));
   }

@@ -26,6 +26,15 @@ constexpr int kNotMet = 4;
 /// A machine with a service: its configuration, the programs in one folder, and a systemctl that
 /// starts the daemon anew.
 class Setup : public testing::Test {
+ public:
+  ~Setup() override {
+    if (!fs::exists(file("pid"))) return;
+    const pid_t pid = std::stoi(base::read_file(file("pid")));
+    ::kill(pid, SIGTERM);
+    // It writes into the folder until it has ended.
+    while (::kill(pid, 0) == 0) std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  }
+
  protected:
   Setup() {
     const fs::path bin = folder_.path() / "bin";
@@ -48,13 +57,6 @@ class Setup : public testing::Test {
         "dtactd --config '{1}' </dev/null >log 2>&1 &\necho $! >pid\n",
         folder_.path().string(), config().string());
     fs::permissions(bin / "systemctl", fs::perms::owner_all);
-  }
-  ~Setup() override {
-    if (!fs::exists(file("pid"))) return;
-    const pid_t pid = std::stoi(base::read_file(file("pid")));
-    ::kill(pid, SIGTERM);
-    // It writes into the folder until it has ended.
-    while (::kill(pid, 0) == 0) std::this_thread::sleep_for(std::chrono::milliseconds(20));
   }
 
   static void replace(std::string& text, const std::string& from, const std::string& to) {

@@ -8,6 +8,7 @@
 #include "clients/common/exit_codes.hpp"
 #include "clients/common/program.hpp"
 #include "clients/ctl/ctl.hpp"
+#include "tests/unit/calibration/sample.hpp"
 
 namespace dtact::ctl {
 namespace {

@@ -92,7 +92,7 @@ class DrivenSource final : public hal::live::Source {
     out.timestamp_ns = now_ns;
     return hal::live::DequeueStatus::filled;
   }
-  int queued() const noexcept override { return 2; }
+  [[nodiscard]] int queued() const noexcept override { return 2; }
   bool enqueue(int /*index*/) noexcept override { return true; }
   void stop() noexcept override { driver_.closing.pass(); }
   std::string check_controls(std::vector<hal::CameraControl>& /*controls*/) override { return {}; }

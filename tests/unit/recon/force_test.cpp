@@ -59,9 +59,10 @@ template <typename Height>
 Contact press(double thickness_mm, double depth_mm, Height height_mm) {
   const hal::sim::ElasticLayer layer(kGrid, kGrid, kSpacing, thickness_mm);
   cv::Mat1d target(kGrid, kGrid);
+  constexpr int kMiddle = kGrid / 2;
   for (int i = 0; i < kGrid; ++i) {
     for (int j = 0; j < kGrid; ++j) {
-      target(i, j) = depth_mm - height_mm((j - kGrid / 2) * kSpacing, (i - kGrid / 2) * kSpacing);
+      target(i, j) = depth_mm - height_mm((j - kMiddle) * kSpacing, (i - kMiddle) * kSpacing);
     }
   }
   const hal::sim::Pressed pressed = layer.solve(target, {});
