@@ -51,9 +51,11 @@ struct CameraInfo {
   std::string backend;       ///< "null", "sim", "replay", ...
   std::string identity;      ///< Stable name: by-path, serial, scene file, folder.
   std::string pixel_format;  ///< "GREY", "YUYV", "MJPEG", ... as it comes from the device.
-  int width = 0;             ///< Pixels.
-  int height = 0;            ///< Pixels.
-  double fps = 0;            ///< The mode's nominal frames per second.
+  int width = 0;             ///< Pixels of the frames that grab() gives.
+  int height = 0;            ///< Pixels of the frames that grab() gives.
+  /// The device's own frames, JPEGs, are this many times as wide and as high.
+  int decode_scale = 1;
+  double fps = 0;  ///< The mode's nominal frames per second.
   /// A light change is complete in frames whose exposure began at least this number of periods
   /// after it, according to their timestamps (exposure plus the camera's queue).
   int light_delay_frames = 2;

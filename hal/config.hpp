@@ -79,6 +79,8 @@ struct CameraConfig {
   int width = 800;              ///< Pixels.
   int height = 600;             ///< Pixels.
   double fps = 60;              ///< Frames a second.
+  /// 1, 2 or 4: JPEG frames are decoded at 1/decode_scale of their size in each direction.
+  int decode_scale = 1;
   SimConfig sim;
   ReplayConfig replay;
   V4l2Config v4l2;

@@ -104,6 +104,24 @@ toml::table parse_setting(const std::string& setting) {
   }
 }
 
+/// A recording has a size and a format of its own, and real cameras the format that they are set
+/// to.
+void check_decode_scale(const hal::CameraConfig& camera) {
+  const int scale = camera.decode_scale;
+  if (scale != 1 && camera.backend == "null") {
+    throw std::runtime_error(fmt::format(
+        "camera.decode_scale = {} is for cameras with MJPEG; camera.backend = \"null\" has "
+        "none: set 1",
+        scale));
+  }
+  const bool divides = camera.width % scale == 0 && camera.height % scale == 0;
+  if (divides || camera.backend == "replay") return;
+  throw std::runtime_error(fmt::format(
+      "camera.decode_scale = {} does not divide frames of {}x{} pixels: set 1, or 2 or 4 "
+      "where width and height are multiples of it",
+      scale, camera.width, camera.height));
+}
+
 /// A wait that ends before its frames have come never ends in a reference.
 void check_reference(const pipeline::ReferenceRules& rules) {
   for (const auto& [key, frames] :
@@ -146,6 +164,7 @@ LoadedConfig load_config(const std::optional<fs::path>& file,
     assembly.take(parse_setting(setting), "", fs::current_path(),
                   [&](unsigned) { return "--set"; });
   }
+  check_decode_scale(loaded.config.hal.camera);
   check_reference(loaded.config.pipeline.reference);
   const pipeline::ContactRules& contact = loaded.config.pipeline.contact;
   if (contact.release_mm >= contact.threshold_mm) {

@@ -77,6 +77,7 @@ std::vector<Key> bind_keys(Config& c) {
       integer("camera.width", camera.width, 16, 8192, "(pixels)"),
       integer("camera.height", camera.height, 16, 8192, "(pixels)"),
       real("camera.fps", camera.fps, 0.1, 1000, "(frames a second)"),
+      one_of("camera.decode_scale", camera.decode_scale, {1, 2, 4}),
       optional_integer("camera.light_delay_frames", p.light_delay_frames, 0, 64, "(frames)"),
       path("camera.sim.scene", camera.sim.scene, "a scene file, or \"\" for the built-in one"),
       integer("camera.sim.seed", camera.sim.seed, 0, std::numeric_limits<std::int64_t>::max(), ""),

@@ -6,6 +6,7 @@
 #include <array>
 #include <filesystem>
 #include <stdexcept>
+#include <utility>
 
 #include "daemon/calibration/text.hpp"
 #include "hal/base/atomic_file.hpp"
@@ -43,6 +44,15 @@ recon::RectifyTable map_table(const std::optional<recon::Lens>& lens, int frame_
   outside.clear();
   return recon::make_crop_table(frame_width, frame_height, place.col, place.row, place.width,
                                 place.height);
+}
+
+std::shared_ptr<const Calibration> for_scaled_frames(std::shared_ptr<const Calibration> calibration,
+                                                     int scale) {
+  if (scale == 1) return calibration;
+  Calibration scaled = *calibration;
+  scaled.model =
+      std::make_shared<const recon::Model>(recon::for_scaled_frames(*calibration->model, scale));
+  return std::make_shared<const Calibration>(std::move(scaled));
 }
 
 void add_untrusted(recon::Model& model, const std::vector<std::uint8_t>& outside) {

@@ -103,10 +103,17 @@ struct Calibration {
   Origin origin;
 };
 
-/// The size of a camera's frames, pixels.
+/// The size of a camera's frames, pixels, and of the JPEGs that they are decoded from.
 struct FrameSize {
   int width = 0;
   int height = 0;
+  int decode_scale = 1;  ///< The JPEGs are this many times as wide and as high.
+
+  /// Frames of a calibration of this size can be had: they are the frames or the JPEGs.
+  [[nodiscard]] bool gives(int frame_width, int frame_height) const noexcept {
+    return (frame_width == width && frame_height == height) ||
+           (frame_width == width * decode_scale && frame_height == height * decode_scale);
+  }
 };
 
 /// Reads and checks a calibration folder, as parse(). Throws std::runtime_error with file, line,
@@ -131,6 +138,11 @@ void save(const Calibration& calibration, const std::filesystem::path& folder);
 [[nodiscard]] recon::RectifyTable map_table(const std::optional<recon::Lens>& lens, int frame_width,
                                             int frame_height, const recon::MapPlace& place,
                                             std::vector<std::uint8_t>& outside);
+
+/// The calibration for frames that are decoded at 1/`scale` of their size: itself at 1. Throws as
+/// recon::for_scaled_frames().
+[[nodiscard]] std::shared_ptr<const Calibration> for_scaled_frames(
+    std::shared_ptr<const Calibration> calibration, int scale);
 
 /// Marks in the model what `outside` marks.
 void add_untrusted(recon::Model& model, const std::vector<std::uint8_t>& outside);

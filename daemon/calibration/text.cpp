@@ -192,7 +192,7 @@ Calibration parse(const std::string& toml, const std::string& reference_png,
   const int frame_width = small(frame, "width", 2, kMaxPixels);
   const int frame_height = small(frame, "height", 2, kMaxPixels);
   frame.finish();
-  if (camera && (camera->width != frame_width || camera->height != frame_height)) {
+  if (camera && !camera->gives(frame_width, frame_height)) {
     top.fail("frame", fmt::format("is for frames of {}x{} pixels, the camera delivers {}x{}: set "
                                   "camera.width and camera.height to the calibration's, or "
                                   "calibrate in this mode",

@@ -206,7 +206,7 @@ void CalibrationCommands::change(const Requester& requester, Change change) {
   changing_ = true;
   using Ready = pipeline::UseCalibration;
   const pipeline::Status now = port_.status();
-  const calibration::FrameSize camera{now.camera.width, now.camera.height};
+  const calibration::FrameSize camera{now.camera.width, now.camera.height, now.camera.decode_scale};
   first_on_worker(
       [&store = store_, &port = port_, change, rules = now.reconstruction, camera] {
         auto ready = attempt<Ready>(v1::ERROR_INVALID, [&] {

@@ -20,9 +20,10 @@ CalibrationSummary summarise(const calibration::Calibration& calibration) {
   if (calibration.model == nullptr) return summary;
   const recon::Model& model = *calibration.model;
   summary.method = model.method == recon::Method::published ? "published" : "lut";
-  summary.mm_per_px = model.mm_per_px;
-  summary.width = model.rectify.width;
-  summary.height = model.rectify.height;
+  const int scale = model.frame_scale;
+  summary.mm_per_px = model.mm_per_px / scale;
+  summary.width = model.rectify.width * scale;
+  summary.height = model.rectify.height * scale;
   const auto depth_at = [&lut = model.lut](int q6) {
     if (lut.um.empty()) return 0.0;
     const int last = static_cast<int>(lut.um.size()) - 1;
@@ -30,8 +31,8 @@ CalibrationSummary summarise(const calibration::Calibration& calibration) {
   };
   summary.covered_from_mm = depth_at(model.lut.covered_from_q6);
   summary.covered_to_mm = depth_at(model.lut.covered_to_q6);
-  summary.frame_width = model.rectify.frame_width;
-  summary.frame_height = model.rectify.frame_height;
+  summary.frame_width = model.rectify.frame_width * scale;
+  summary.frame_height = model.rectify.frame_height * scale;
   summary.sharpen_steps = recon::sharpening_steps(model);
   return summary;
 }

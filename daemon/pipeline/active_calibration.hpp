@@ -18,13 +18,19 @@ struct ActiveCalibration {
   bool camera_mismatch = false;
 };
 
-/// Throws std::invalid_argument with the fix when the calibration cannot be used with frames of
-/// this camera at all (other differences set a health flag) or with these rules.
+/// A calibration for the JPEGs of a camera whose frames are decoded at a smaller size becomes one
+/// for its frames (recon::for_scaled_frames()): image.calibration. Throws std::invalid_argument
+/// with the fix when the calibration cannot be used with frames of this camera at all (other
+/// differences set a health flag) or with these rules.
 [[nodiscard]] std::unique_ptr<ActiveCalibration> activate(
     const std::shared_ptr<const calibration::Calibration>& calibration,
     const hal::CameraInfo& camera, const ReconstructionRules& rules);
 
-/// The camera, its mode or its controls are not those of the calibration.
+/// The camera gives frames of the calibration's size, or decodes them from JPEGs that have it.
+[[nodiscard]] bool fits(const calibration::Calibration& calibration, const hal::CameraInfo& camera);
+
+/// The camera, its mode or its controls are not those of a calibration that was made for its
+/// frames.
 [[nodiscard]] bool camera_differs(const calibration::Calibration& calibration,
                                   const hal::CameraInfo& camera);
 

@@ -27,6 +27,7 @@ CaptureLoop::CaptureLoop(const CaptureParts& parts, const PipelineConfig& config
       exchange_(parts.exchange),
       clock_(parts.clock),
       period_ns_(std::llround(1e9 / camera_.info().fps)),
+      decode_scale_(camera_.info().decode_scale),
       timeout_(std::min<std::chrono::nanoseconds>(
           std::chrono::nanoseconds(hal::stall_ns(period_ns_)), kLongestGrab)),
       timeline_(config.light, config.light_delay_frames.value_or(camera_.info().light_delay_frames),
@@ -195,8 +196,8 @@ void CaptureLoop::publish(DepthFrame& out) noexcept {
   // The buffer holds a picture of this size without compression.
   out.has_jpeg = want_jpeg && !frame_.jpeg().empty() && frame_.jpeg().size() <= out.jpeg.capacity();
   if (out.has_jpeg) {
-    out.jpeg_width = frame_.luma().width;
-    out.jpeg_height = frame_.luma().height;
+    out.jpeg_width = frame_.luma().width * decode_scale_;
+    out.jpeg_height = frame_.luma().height * decode_scale_;
     out.jpeg.assign(frame_.jpeg().begin(), frame_.jpeg().end());
   }
   out.done_ns = clock_.monotonic_ns();

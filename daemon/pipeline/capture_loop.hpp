@@ -63,6 +63,7 @@ class CaptureLoop {
   Exchange& exchange_;
   base::Clock& clock_;
   const std::int64_t period_ns_;
+  const int decode_scale_;  // of the JPEGs to the frames
   const std::chrono::nanoseconds timeout_;
 
   LightTimeline timeline_;  // before the tracker, which reads it

@@ -77,10 +77,9 @@ Pipeline::Pipeline(std::unique_ptr<hal::Camera> camera, std::unique_ptr<hal::Lig
   if (calibration) {
     try {
       active = activate(calibration, info_, rules_);
-      calibration_ = calibration;
+      calibration_ = active->image.calibration;
     } catch (const std::invalid_argument& e) {
-      const recon::RectifyTable& table = calibration->model->rectify;
-      unusable = table.frame_width != info_.width || table.frame_height != info_.height;
+      unusable = !fits(*calibration, info_);
       restore_failure_ = e.what();
     }
   }
@@ -88,7 +87,7 @@ Pipeline::Pipeline(std::unique_ptr<hal::Camera> camera, std::unique_ptr<hal::Lig
                                         std::move(active), unusable);
   if (calibration_) {
     try {
-      loop_->tracker().restore(*calibration);
+      loop_->tracker().restore(*calibration_);
     } catch (const std::exception& e) {
       restore_failure_ = e.what();  // the calibration's own reference does instead
     }
@@ -97,10 +96,12 @@ Pipeline::Pipeline(std::unique_ptr<hal::Camera> camera, std::unique_ptr<hal::Lig
 
 DepthFrame Pipeline::prototype(const calibration::Calibration* calibration) const {
   DepthFrame frame;
+  const int scale = info_.decode_scale;
   std::size_t map = pixels(info_.width, info_.height);
   if (calibration != nullptr) {
     const recon::RectifyTable& table = calibration->model->rectify;
-    map = std::max(map, pixels(table.width, table.height));
+    const int to = table.frame_width == info_.width ? 1 : scale;
+    map = std::max(map, pixels(table.width / to, table.height / to));
   }
   // Sized, not only reserved: copies keep the size, and the pages are mapped now.
   frame.depth_um.resize(map);
@@ -110,7 +111,7 @@ DepthFrame Pipeline::prototype(const calibration::Calibration* calibration) cons
   frame.luma.resize(pixels(info_.width, info_.height));
   // The size of YUYV, for which drivers make room themselves (uvcvideo: the camera's
   // dwMaxVideoFrameSize).
-  frame.jpeg.resize(2 * pixels(info_.width, info_.height));
+  frame.jpeg.resize(2 * pixels(info_.width * scale, info_.height * scale));
   return frame;
 }
 
@@ -178,14 +179,15 @@ UseCalibration Pipeline::prepare(const std::shared_ptr<const calibration::Calibr
                                  const ReconstructionRules& rules) const {
   // First: that it is for other frames says more than that it has no room.
   std::shared_ptr<ActiveCalibration> active = activate(calibration, camera_->info(), rules);
-  const recon::RectifyTable& table = calibration->model->rectify;
+  const auto in_use = active->image.calibration;
+  const recon::RectifyTable& table = in_use->model->rectify;
   if (pixels(table.width, table.height) > depth_capacity_) {
     throw std::invalid_argument(
         fmt::format("a depth map of {}x{} pixels needs more memory than was taken at start: "
                     "restart dtactd with this calibration",
                     table.width, table.height));
   }
-  return {.calibration = calibration, .prepared = std::move(active)};
+  return {.calibration = in_use, .prepared = std::move(active)};
 }
 
 SetReconstruction Pipeline::prepare_maps(

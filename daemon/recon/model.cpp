@@ -1,9 +1,12 @@
 #include "daemon/recon/model.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
+#include <numeric>
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 namespace dtact::recon {
 
@@ -100,6 +103,80 @@ Model decimate(const Model& model, int factor) {
   coarse.mm_per_px = model.mm_per_px * factor;
   coarse.smoothing_px = model.smoothing_px / factor;
   return coarse;
+}
+
+namespace {
+
+/// Where one axis of a frame of 1/scale the size is read.
+struct ScaledPlace {
+  std::int16_t pixel = 0;   ///< 0 … pixels − 2.
+  std::uint8_t weight = 0;  ///< Of the next pixel, 0 … 128.
+};
+
+/// `sum`: of `count` places in the whole frame, 1/128 pixel. `pixels`: of the scaled frame.
+ScaledPlace scaled_place(std::int64_t sum, int count, int scale, int pixels) {
+  // The middle of a scaled pixel is the middle of the scale pixels that it is the mean of.
+  const double whole = static_cast<double>(sum) / (128.0 * count);
+  const double at = std::clamp((whole - 0.5 * (scale - 1)) / scale, 0.0, pixels - 1.0);
+  const int pixel = std::min(static_cast<int>(at), pixels - 2);
+  return {static_cast<std::int16_t>(pixel),
+          static_cast<std::uint8_t>(std::lround((at - pixel) * 128))};
+}
+
+std::vector<std::uint16_t> scaled_image(const std::vector<std::uint16_t>& image, int width,
+                                        int height, int scale) {
+  std::vector<std::uint16_t> scaled;
+  scaled.reserve(image.size() / static_cast<std::size_t>(scale * scale));
+  const auto pixels = static_cast<std::uint32_t>(scale * scale);
+  for (int y = 0; y < height; y += scale) {
+    for (int x = 0; x < width; x += scale) {
+      std::uint32_t sum = pixels / 2;
+      for (int k = 0; k < scale; ++k) {
+        const std::uint16_t* const row = image.data() + std::ptrdiff_t{y + k} * width + x;
+        sum = std::accumulate(row, row + scale, sum);
+      }
+      scaled.push_back(static_cast<std::uint16_t>(sum / pixels));
+    }
+  }
+  return scaled;
+}
+
+}  // namespace
+
+Model for_scaled_frames(const Model& model, int scale) {
+  const int width = model.rectify.frame_width;
+  const int height = model.rectify.frame_height;
+  Model scaled = decimate(model, scale);
+  if (width % scale != 0 || height % scale != 0 || width < 2 * scale || height < 2 * scale) {
+    throw std::invalid_argument("frames: " + std::to_string(width) + "x" + std::to_string(height) +
+                                " pixels cannot be halved to 1/" + std::to_string(scale));
+  }
+  RectifyTable& table = scaled.rectify;
+  table.frame_width = width / scale;
+  table.frame_height = height / scale;
+  const std::vector<RectifyTable::Entry> fine = std::exchange(table.entries, {});
+  const int fine_width = table.fine_width();
+  table.decimation = 1;
+  table.entries.reserve(fine.size() / static_cast<std::size_t>(scale * scale));
+  for (int y = 0; y < table.height; ++y) {
+    for (int x = 0; x < table.width; ++x) {
+      std::int64_t column = 0;
+      std::int64_t row = 0;
+      for (int k = 0; k < scale; ++k) {
+        const auto first = fine.begin() + std::ptrdiff_t{y * scale + k} * fine_width + x * scale;
+        for (auto entry = first; entry != first + scale; ++entry) {
+          column += entry->x * 128 + entry->fx;
+          row += entry->y * 128 + entry->fy;
+        }
+      }
+      const ScaledPlace across = scaled_place(column, scale * scale, scale, table.frame_width);
+      const ScaledPlace down = scaled_place(row, scale * scale, scale, table.frame_height);
+      table.entries.push_back({across.pixel, down.pixel, across.weight, down.weight});
+    }
+  }
+  scaled.reference_q8 = scaled_image(model.reference_q8, width, height, scale);
+  scaled.frame_scale = scale;
+  return scaled;
 }
 
 }  // namespace dtact::recon

@@ -53,6 +53,9 @@ enum class Method : std::uint8_t {
 struct Model {
   Method method = Method::lut;
   RectifyTable rectify;  ///< Camera frame → depth map.
+  /// 1, 2 or 4: frames and map have 1/frame_scale of the calibration's pixels in each direction
+  /// (for_scaled_frames()).
+  int frame_scale = 1;
   double mm_per_px = 0;  ///< Millimetres per pixel of the depth map.
   /// Standard deviation of the Gaussian that smooths the difference, pixels of the depth map, 0 …
   /// 10. Method::published has filters of its own and ignores it.
@@ -95,5 +98,12 @@ void check(const Model& model);
 /// within half a pixel of `model`. Throws
 /// std::invalid_argument for another factor, a map smaller than one pixel or a decimated model.
 [[nodiscard]] Model decimate(const Model& model, int factor);
+
+/// The model for a camera whose frames are decoded at 1/`scale` (1, 2 or 4) of their size, each
+/// pixel the mean of scale × scale. A pixel of its map is that of decimate() with this factor, but
+/// is read once: at the mean place of the pixels it stands for. Throws std::invalid_argument for
+/// another scale, frames whose sides are no multiples of it, a map smaller than one pixel of the
+/// result or a decimated model.
+[[nodiscard]] Model for_scaled_frames(const Model& model, int scale);
 
 }  // namespace dtact::recon

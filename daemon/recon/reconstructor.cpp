@@ -11,9 +11,8 @@ namespace dtact::recon {
 
 std::vector<int> sharpening_steps(const Model& model) {
   std::vector<int> steps;
-  if (!model.scattering || !Sharpener::reaches(*model.scattering, kSharpenedAt * model.mm_per_px)) {
-    return steps;
-  }
+  const double mm_per_px = kSharpenedAt * model.mm_per_px / model.frame_scale;
+  if (!model.scattering || !Sharpener::reaches(*model.scattering, mm_per_px)) return steps;
   for (const Model::Sharpened& sharpened : model.sharpened) steps.push_back(sharpened.steps);
   return steps;
 }

@@ -32,8 +32,8 @@ struct DrawnTiles {
 inline constexpr std::size_t kLumaPadding = 64;
 
 /// By how many steps a calibration's levels can be sharpened, ascending: those that it has LUTs
-/// for; none where its light is scattered wider than the filter reaches. `model`: at full
-/// resolution.
+/// for; none where its light is scattered wider than the filter reaches. `model`: not
+/// decimated.
 [[nodiscard]] std::vector<int> sharpening_steps(const Model& model);
 
 /// Turns luma into depth, in fixed point (formats and ranges in kernels.hpp: Q6 luma, Q12 gain,

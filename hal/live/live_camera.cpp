@@ -57,13 +57,15 @@ LiveCamera::LiveCamera(const CameraConfig& config, const std::string& backend,
                        const std::string& identity, Opener opener)
     : open_(std::move(opener)),
       period_ns_(std::llround(1e9 / config.fps)),
+      decode_scale_(config.decode_scale),
       cpus_(base::allowed_cpus()),
-      leases_(config.width, config.height) {
+      leases_(config.width / config.decode_scale, config.height / config.decode_scale) {
   if (!(config.fps > 0)) throw std::runtime_error("camera.fps must be positive");
   info_.backend = backend;
   info_.identity = identity;
-  info_.width = config.width;
-  info_.height = config.height;
+  info_.width = config.width / decode_scale_;
+  info_.height = config.height / decode_scale_;
+  info_.decode_scale = decode_scale_;
   info_.fps = config.fps;
   fix_ = "the camera has not been started";
   watcher_ = std::thread([this] { watch_controls(); });
@@ -125,7 +127,9 @@ void LiveCamera::connect() {
     opened = open_();
     change_again(changed, opened);
   });
-  auto fresh = std::make_shared<Connection>(opened.source);
+  const std::string wrong = mjpeg::scale_error(decode_scale_, opened.pixel_format);
+  if (!wrong.empty()) throw ModeError(wrong);
+  auto fresh = std::make_shared<Connection>(opened.source, decode_scale_);
   if (area_) fresh->decoder.will_read(*area_);
   opened_ns_ = now_ns();
   last_buffer_ns_ = 0;

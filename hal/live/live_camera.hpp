@@ -47,7 +47,8 @@ class LiveCamera : public Camera {
   /// An open device. The watching thread may hold it a little longer than the capture thread, and
   /// so may a frame that was lent.
   struct Connection {
-    explicit Connection(const std::shared_ptr<Source>& s) : source(s), decoder(s->format()) {}
+    Connection(const std::shared_ptr<Source>& s, int decode_scale)
+        : source(s), decoder(s->format(), decode_scale) {}
     std::shared_ptr<Source> source;
     PayloadDecoder decoder;
   };
@@ -74,6 +75,7 @@ class LiveCamera : public Camera {
 
   const Opener open_;
   const std::int64_t period_ns_;
+  const int decode_scale_;
   const cpu_set_t cpus_;  // that the thread which made this may use
 
   // The capture thread's own.

@@ -31,10 +31,10 @@ bool has_markers(std::span<const std::uint8_t> payload) noexcept {
 
 }  // namespace
 
-PayloadDecoder::PayloadDecoder(const Format& format)
+PayloadDecoder::PayloadDecoder(const Format& format, int scale)
     : format_(format),
       jpeg_(format.encoding == Encoding::jpeg
-                ? std::make_unique<mjpeg::GreyDecoder>(format.width, format.height)
+                ? std::make_unique<mjpeg::GreyDecoder>(format.width, format.height, scale)
                 : nullptr) {}
 
 void PayloadDecoder::will_read(const Area& area) noexcept {

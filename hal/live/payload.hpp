@@ -14,7 +14,8 @@ enum class PayloadStatus : std::uint8_t { ok, flagged, markers, too_short, undec
 /// Turns payloads of one format into luma. Does not allocate after construction.
 class PayloadDecoder {
  public:
-  explicit PayloadDecoder(const Format& format);
+  /// `scale`: GreyDecoder's; raw formats have none.
+  explicit PayloadDecoder(const Format& format, int scale = 1);
 
   /// Only this part of the next payloads needs decoding. It lies inside the image.
   void will_read(const Area& area) noexcept;

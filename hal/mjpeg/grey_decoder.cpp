@@ -1,5 +1,7 @@
 #include "hal/mjpeg/grey_decoder.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <csetjmp>
@@ -77,7 +79,8 @@ const char* describe(Status status) noexcept {
 }
 
 struct GreyDecoder::Impl {
-  Impl(int w, int h) : width(w), height(h), crop{0, 0, w, h}, arena(arena_bytes(w)) {
+  Impl(int w, int h, int s)
+      : width(w), height(h), scale(s), crop{0, 0, w / s, h / s}, arena(arena_bytes(w)) {
     cinfo.err = jpeg_std_error(&errors);
     cinfo.client_data = this;
     errors.error_exit = [](j_common_ptr c) {
@@ -147,6 +150,8 @@ struct GreyDecoder::Impl {
   Status pixels(std::uint8_t* luma, std::ptrdiff_t stride) noexcept {
     if (setjmp(way_out) != 0) return failure;
     cinfo.out_color_space = JCS_GRAYSCALE;
+    cinfo.scale_num = 1;
+    cinfo.scale_denom = static_cast<unsigned>(scale);
     jpeg_start_decompress(&cinfo);
     JDIMENSION left = static_cast<JDIMENSION>(crop.x);
     JDIMENSION columns = static_cast<JDIMENSION>(crop.width);
@@ -178,8 +183,9 @@ struct GreyDecoder::Impl {
     }
   }
 
-  int width;
-  int height;
+  int width;   // of the JPEGs
+  int height;  // of the JPEGs
+  int scale;
   Area crop;
   JpegArena arena;
   jpeg_decompress_struct cinfo{};
@@ -189,11 +195,26 @@ struct GreyDecoder::Impl {
   Status failure = Status::ok;
 };
 
-GreyDecoder::GreyDecoder(int width, int height) {
+std::string scale_error(int scale, std::string_view pixel_format) {
+  if (scale == 1 || pixel_format == "MJPEG") return {};
+  return fmt::format(
+      "camera.decode_scale = {}: the frames are {}, and only MJPEG is decoded at a smaller size. "
+      "Set camera.decode_scale = 1 and a lower reconstruction.resolution, or take a mode with "
+      "MJPEG",
+      scale, pixel_format);
+}
+
+GreyDecoder::GreyDecoder(int width, int height, int scale) {
   if (width < 1 || height < 1 || width > kMaxSide || height > kMaxSide) {
     throw std::invalid_argument("JPEG decoder: width and height must be 1 to 16384 pixels");
   }
-  impl_ = std::make_unique<Impl>(width, height);
+  if ((scale != 1 && scale != 2 && scale != 4) || width % scale != 0 || height % scale != 0) {
+    throw std::invalid_argument(fmt::format(
+        "JPEG decoder: {}x{} pixels cannot be decoded at 1/{} of the size: set camera.decode_scale "
+        "to 1, or to 2 or 4 where width and height are multiples of it",
+        width, height, scale));
+  }
+  impl_ = std::make_unique<Impl>(width, height, scale);
 }
 GreyDecoder::GreyDecoder(GreyDecoder&&) noexcept = default;
 GreyDecoder& GreyDecoder::operator=(GreyDecoder&&) noexcept = default;
@@ -202,8 +223,9 @@ GreyDecoder::~GreyDecoder() = default;
 void GreyDecoder::set_crop(const Area& crop) noexcept {
   Impl& d = *impl_;
   const bool fits = crop.x >= 0 && crop.y >= 0 && crop.width > 0 && crop.height > 0 &&
-                    crop.width <= d.width - crop.x && crop.height <= d.height - crop.y;
-  d.crop = fits ? crop : Area{0, 0, d.width, d.height};
+                    crop.width <= d.width / d.scale - crop.x &&
+                    crop.height <= d.height / d.scale - crop.y;
+  d.crop = fits ? crop : Area{0, 0, d.width / d.scale, d.height / d.scale};
 }
 
 Status GreyDecoder::decode(std::span<const std::uint8_t> payload, std::uint8_t* luma,

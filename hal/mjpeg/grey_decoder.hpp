@@ -4,6 +4,8 @@
 #include <cstdint>
 #include <memory>
 #include <span>
+#include <string>
+#include <string_view>
 
 #include "hal/frame.hpp"
 
@@ -22,6 +24,10 @@ enum class Status : std::uint8_t {
 /// The cause in words, without a full stop ("the payload ends before the end-of-image marker").
 [[nodiscard]] const char* describe(Status status) noexcept;
 
+/// Why frames of a pixel format ("MJPEG", "GREY") are not decoded at 1/scale of their size
+/// (CameraConfig::decode_scale), and the fix. Empty where they are.
+[[nodiscard]] std::string scale_error(int scale, std::string_view pixel_format);
+
 struct Size {
   int width = 0;   ///< Pixels.
   int height = 0;  ///< Pixels.
@@ -35,9 +41,12 @@ struct Size {
 /// move-only.
 class GreyDecoder {
  public:
-  /// Throws std::invalid_argument unless both sides are 1…16384 pixels, std::runtime_error when
-  /// libjpeg refuses to start.
-  GreyDecoder(int width, int height);
+  /// `width` and `height`: of the JPEGs, pixels. `scale`: 1, 2 or 4; decode() gives 1/scale of the
+  /// pixels in each direction, each about the mean of the scale × scale that it stands for. They
+  /// come from the low frequencies alone, which takes less time. Throws
+  /// std::invalid_argument unless both sides are 1…16384 pixels and multiples of the scale,
+  /// std::runtime_error when libjpeg refuses to start.
+  GreyDecoder(int width, int height, int scale = 1);
   GreyDecoder(GreyDecoder&&) noexcept;
   GreyDecoder& operator=(GreyDecoder&&) noexcept;
   GreyDecoder(const GreyDecoder&) = delete;
@@ -46,13 +55,13 @@ class GreyDecoder {
 
   /// From now on decode() computes only the pixels needed to give those of `crop` unchanged;
   /// what it writes elsewhere in the picture is unspecified. All of the payload is
-  /// still parsed, so damage anywhere is reported. A crop without pixels, or one that leaves the
-  /// picture, means the whole picture.
+  /// still parsed, so damage anywhere is reported. In pixels of what decode() gives. A crop without
+  /// pixels, or one that leaves the picture, means the whole picture.
   void set_crop(const Area& crop) noexcept;
 
-  /// Writes width × height bytes to `luma`, rows `stride` bytes apart. Unless ok the output is
-  /// partly written and must not be used: libjpeg would fill a damaged frame with grey. Bytes after
-  /// the end-of-image marker are ignored (drivers pad their payloads).
+  /// Writes width/scale × height/scale bytes to `luma`, rows `stride` bytes apart. Unless ok the
+  /// output is partly written and must not be used: libjpeg would fill a damaged frame with grey.
+  /// Bytes after the end-of-image marker are ignored (drivers pad their payloads).
   [[nodiscard]] Status decode(std::span<const std::uint8_t> payload, std::uint8_t* luma,
                               std::ptrdiff_t stride) noexcept;
 

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <span>
 #include <stdexcept>
+#include <string>
 
 namespace dtact::hal::replay {
 
@@ -13,7 +14,10 @@ ReplayCamera::ReplayCamera(const CameraConfig& config, base::Clock& clock)
     : config_(config),
       clock_(clock),
       recording_(load_recording(config.replay.folder)),
-      decoder_(recording_.width, recording_.height) {
+      decode_scale_(config.decode_scale),
+      decoder_(recording_.width, recording_.height, recording_.is_jpeg() ? decode_scale_ : 1) {
+  const std::string wrong = mjpeg::scale_error(decode_scale_, pixel_format());
+  if (!wrong.empty()) throw std::invalid_argument(wrong);
   const auto count = static_cast<double>(recording_.count());
   if (recording_.offsets_ns.size() > 1) {
     const auto last = static_cast<double>(recording_.offsets_ns.back());
@@ -30,7 +34,8 @@ ReplayCamera::ReplayCamera(const CameraConfig& config, base::Clock& clock)
   }
   if (recording_.is_jpeg()) {
     for (auto& buffer : decoded_) {
-      buffer = luma::LumaBuffer(recording_.width, recording_.height);
+      buffer =
+          luma::LumaBuffer(recording_.width / decode_scale_, recording_.height / decode_scale_);
     }
   }
 }
@@ -39,9 +44,10 @@ CameraInfo ReplayCamera::info() const {
   CameraInfo info;
   info.backend = "replay";
   info.identity = config_.replay.folder.string();
-  info.pixel_format = recording_.is_jpeg() ? "MJPEG" : "GREY";
-  info.width = recording_.width;
-  info.height = recording_.height;
+  info.pixel_format = pixel_format();
+  info.width = recording_.width / decode_scale_;
+  info.height = recording_.height / decode_scale_;
+  info.decode_scale = decode_scale_;
   info.fps = fps_;
   info.light_delay_frames = 0;  // a recording shows no light of ours
   return info;

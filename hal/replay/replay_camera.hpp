@@ -22,7 +22,7 @@ namespace dtact::hal::replay {
 class ReplayCamera final : public Camera, private FrameOwner {
  public:
   /// Throws std::runtime_error as load_recording() does, std::invalid_argument when the rate is not
-  /// above 0.
+  /// above 0 or the recording is not decoded at 1/decode_scale.
   explicit ReplayCamera(const CameraConfig& config, base::Clock& clock = base::system_clock());
 
   [[nodiscard]] CameraInfo info() const override;
@@ -37,10 +37,14 @@ class ReplayCamera final : public Camera, private FrameOwner {
   [[nodiscard]] std::uint64_t newest_due(std::int64_t now_ns) const noexcept;
   [[nodiscard]] GrabStatus lend(Frame& out, FrameInfo info) noexcept;
   void give_back(int /*index*/) noexcept override {}
+  [[nodiscard]] const char* pixel_format() const noexcept {
+    return recording_.is_jpeg() ? "MJPEG" : "GREY";
+  }
 
   CameraConfig config_;
   base::Clock& clock_;
   Recording recording_;
+  int decode_scale_;
   double fps_ = 0;
   std::int64_t round_ns_ = 0;  ///< From the first frame to the first of the next round.
   mjpeg::GreyDecoder decoder_;

@@ -9,6 +9,8 @@
 #include <cmath>
 #include <ctime>
 #include <optional>
+#include <stdexcept>
+#include <string>
 #include <utility>
 
 #include "hal/luma/luma.hpp"
@@ -56,10 +58,20 @@ class SimCamera::Impl {
       : owner(frames),
         output(output_from_name(config.sim.output)),
         paced(config.sim.paced),
+        decode_scale(config.decode_scale),
         clock(the_clock),
         device(configured_scene(config), config.sim.seed, output, std::move(link), the_clock) {
-    for (auto& buffer : buffers) buffer = luma::LumaBuffer(config.width, config.height);
-    if (output == Output::mjpeg) decoder.emplace(config.width, config.height);
+    const std::string wrong = mjpeg::scale_error(decode_scale, format());
+    if (!wrong.empty()) throw std::runtime_error(wrong);
+    for (auto& buffer : buffers) {
+      buffer = luma::LumaBuffer(config.width / decode_scale, config.height / decode_scale);
+    }
+    if (output == Output::mjpeg) decoder.emplace(config.width, config.height, decode_scale);
+  }
+
+  /// As a camera's driver names it.
+  [[nodiscard]] const char* format() const noexcept {
+    return std::array{"GREY", "YUYV", "MJPEG"}[static_cast<std::size_t>(output)];
   }
 
   GrabStatus grab(Frame& out, std::int64_t timeout_ns) noexcept;
@@ -70,6 +82,7 @@ class SimCamera::Impl {
   FrameOwner& owner;
   const Output output;
   const bool paced;
+  const int decode_scale;
   base::Clock& clock;
   Device device;
   std::optional<mjpeg::GreyDecoder> decoder;
@@ -173,9 +186,10 @@ CameraInfo SimCamera::info() const {
   CameraInfo info;
   info.backend = "sim";
   info.identity = "sim:" + scene.sensor;
-  info.pixel_format = std::array{"GREY", "YUYV", "MJPEG"}[static_cast<std::size_t>(impl_->output)];
-  info.width = scene.camera.width;
-  info.height = scene.camera.height;
+  info.pixel_format = impl_->format();
+  info.width = scene.camera.width / impl_->decode_scale;
+  info.height = scene.camera.height / impl_->decode_scale;
+  info.decode_scale = impl_->decode_scale;
   info.fps = scene.camera.fps;
   info.light_delay_frames = scene.camera.light_delay_frames;
   // The exposure as its effect, the gain included.

@@ -255,19 +255,26 @@ Case opencv(const Inputs& in) {
           [&in, state] { return compare_roughly(state->depth.ptr<float>(), in.specified); }};
 }
 
-/// From the payload to the daemon's results, or the decoding only.
-Case mjpeg(const Inputs& in, const std::string& name, bool reconstruct) {
+/// From the payload to the daemon's results, or the decoding only. `decimation`: of the map, from
+/// frames that are decoded at 1/`scale` of their size.
+Case mjpeg(const Inputs& in, const std::string& name, bool reconstruct, int decimation = 1,
+           int scale = 1) {
   struct State {
-    hal::mjpeg::GreyDecoder decoder{kFrameWidth, kFrameHeight};
-    hal::luma::LumaBuffer luma{kFrameWidth, kFrameHeight};
+    hal::mjpeg::GreyDecoder decoder;
+    hal::luma::LumaBuffer luma;
     DaemonFrame daemon;
     bool ok = true;
-    explicit State(const Inputs& inputs) : daemon(inputs.model) {
+    State(const std::shared_ptr<const recon::Model>& model, int frame_scale)
+        : decoder(kFrameWidth, kFrameHeight, frame_scale),
+          luma(kFrameWidth / frame_scale, kFrameHeight / frame_scale),
+          daemon(model) {
       const recon::FrameRegion read = daemon.region();
       decoder.set_crop({read.x, read.y, read.width, read.height});
     }
   };
-  auto state = std::make_shared<State>(in);
+  const recon::Model of = scale == 1 ? *in.model : recon::for_scaled_frames(*in.model, scale);
+  auto state = std::make_shared<State>(
+      std::make_shared<const recon::Model>(recon::decimate(of, decimation / scale)), scale);
   return {name,
           [&in, state, reconstruct] {
             const auto status =
@@ -296,6 +303,15 @@ const std::vector<std::pair<std::string, Maker>>& makers() {
         {"opencv", [](const auto&, const Inputs& in) { return opencv(in); }},
         {"decode", [](const auto& name, const Inputs& in) { return mjpeg(in, name, false); }},
         {"decode+full", [](const auto& name, const Inputs& in) { return mjpeg(in, name, true); }}};
+    for (const auto& [map, decimation] : {std::pair("half", 2), std::pair("quarter", 4)}) {
+      for (const int scale : {1, decimation}) {
+        all.emplace_back(
+            fmt::format("decode{}+{}", scale == 1 ? "" : fmt::format("/{}", scale), map),
+            [decimation, scale](const std::string& name, const Inputs& in) {
+              return mjpeg(in, name, true, decimation, scale);
+            });
+      }
+    }
     for (const int radius : {0, 40, 80, 120, 160, 190, 220, 260, 300, 340, 380, 450}) {
       // Only active tiles are computed.
       all.emplace_back(

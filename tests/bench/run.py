@@ -33,6 +33,10 @@ LABEL = {
     "full-bare": "the same, no contact, no uncertainty",
     "decode+full": "MJPEG frame to depth",
     "decode": "MJPEG decode alone",
+    "decode+half": "MJPEG frame to depth at half",
+    "decode/2+half": "the same, decoded at half",
+    "decode+quarter": "MJPEG frame to depth at a quarter",
+    "decode/4+quarter": "the same, decoded at a quarter",
     "press:0": "no contact",
     "half": "half resolution, 290x290",
     "quarter": "quarter resolution, 145x145",
@@ -189,6 +193,13 @@ def goals(medians, rounds, shares):
         met = value <= most
         lines.append((f"{name}: at most {most:.2f} of the full field", f"{value:.2f} ±{s:.0f} %",
                       met, "" if met else f"short by {100 * (value / most - 1):.0f} %"))
+    # 0.37 of 0.588 ms and 0.29 of it: what a processor took for all of a full-field frame.
+    for name, case, most in (("half", "decode/2+half", 0.63), ("a quarter", "decode/4+quarter", 0.49)):
+        value, s = ratio(case, "decode+full")
+        met = value <= most
+        lines.append((f"MJPEG decoded at {name}: at most {most:.2f} of MJPEG at full resolution",
+                      f"{value:.2f} ±{s:.0f} %", met,
+                      "" if met else f"short by {100 * (value / most - 1):.0f} %"))
     reported = 100 * (1 - ratio("full-bare", "full")[0])
     lines.append(("contact and uncertainty: at most 10 % of the full field", f"{reported:.1f} %",
                   reported <= 10, "" if reported <= 10 else f"short by {reported - 10:.1f} % of the full field"))

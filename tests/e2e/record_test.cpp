@@ -29,6 +29,10 @@ using testing::HasSubstr;
 
 class Record : public testing::Test {
  protected:
+  explicit Record(const std::vector<std::string>& settings = {}) : sensor({}, true, settings) {}
+
+  /// Records, makes the depth anew with the same calibration and compares.
+  void make_the_same_depth_anew() const;
   [[nodiscard]] std::vector<std::string> command(const std::vector<std::string>& more = {}) const {
     std::vector<std::string> all = {
         DTACTCTL_PROGRAM, "--port", std::to_string(sensor.daemon->port()),
@@ -179,10 +183,19 @@ TEST_F(Record, AFileIsNotReplacedUnasked) {
   EXPECT_THAT(said, HasSubstr(" frames in "));
 }
 
+/// With a daemon that decodes at half the size.
+class RecordAtHalf : public Record {
+ protected:
+  RecordAtHalf() : Record({"camera.decode_scale=2"}) {}
+};
+
 // The same calibration, the recorded JPEGs and the recorded reference give the recorded depth, bit
 // for bit, except at the edge of activity: the daemon's state before the recording (noise,
 // hysteresis) is not in it, and a tile that only one of the two computed is 0 in the other.
-TEST_F(Record, TheSameCalibrationMakesTheSameDepthAnew) {
+TEST_F(Record, TheSameCalibrationMakesTheSameDepthAnew) { make_the_same_depth_anew(); }
+TEST_F(RecordAtHalf, TheSameCalibrationMakesTheSameDepthAnew) { make_the_same_depth_anew(); }
+
+void Record::make_the_same_depth_anew() const {
   std::string said;
   ASSERT_EQ(run_program(command({"--seconds", "5"}), &said), 0) << said;
   const fs::path anew = folder.path() / "anew.mcap";
@@ -210,6 +223,7 @@ TEST_F(Record, TheSameCalibrationMakesTheSameDepthAnew) {
     apart.push_back(other.depth().uncertainty_um() / frame.depth().uncertainty_um());
     const auto was = client::values_of(frame.depth());
     const auto is = client::values_of(other.depth());
+    EXPECT_EQ(frame.depth().decimation(), other.depth().decimation());
     ASSERT_EQ(was.size(), is.size());
     pixels += was.size();
     for (std::size_t i = 0; i < was.size(); ++i) {

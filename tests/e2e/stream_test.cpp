@@ -63,6 +63,50 @@ TEST(Stream, SixHundredFramesOfTheRightDepth) {
   EXPECT_LE(worst_no_contact, 0.01);
 }
 
+// As SixHundredFramesOfTheRightDepth, from pictures of half the size.
+TEST(Stream, FramesDecodedAtHalfTheSizeGiveTheRightDepth) {
+  const Sensor sensor({}, true, {"camera.decode_scale=2"});
+  client::Client client = sensor.connect();
+  v1::Subscribe subscription;
+  subscription.set_depth(v1::DEPTH_INT16);
+  subscription.set_jpeg(true);
+  client.subscribe(subscription);
+  const hal::sim::Truth truth(hal::sim::default_scene());
+  int pressed = 0;
+  int jpegs = 0;
+  double worst = 0;
+  double worst_no_contact = 0;
+  ASSERT_TRUE(read_until(
+      client,
+      [&](const Item& item) {
+        const auto* frame = std::get_if<v1::Frame>(&item);
+        if (frame == nullptr) return false;
+        if (frame->has_jpeg()) {
+          EXPECT_EQ(frame->jpeg().width(), 800U);
+          EXPECT_EQ(frame->jpeg().height(), 600U);
+          ++jpegs;
+        }
+        if (!frame->has_depth() || frame->sequence() % 10 != 0) return false;
+        EXPECT_EQ(frame->depth().decimation(), 2U);
+        EXPECT_EQ(frame->depth().width(), kCropWidth / 2);
+        EXPECT_EQ(frame->depth().height(), kCropHeight / 2);
+        const DepthError error = depth_error(*frame, truth);
+        if (error.inside_pixels == 0) {
+          worst_no_contact = std::max(worst_no_contact, error.outside_mm);
+        } else if (error.inside_pixels > 1250 && frame->sequence() % 720 < 360) {
+          worst = std::max(worst, error.inside_mm);
+          ++pressed;
+        }
+        return pressed == 10;
+      },
+      std::chrono::seconds(120)));
+  EXPECT_GT(jpegs, 0);
+  std::printf("decoded at half: worst frame of the ball %.4f mm; no contact %.4f mm\n", worst,
+              worst_no_contact);
+  EXPECT_LE(worst, 0.03);
+  EXPECT_LE(worst_no_contact, 0.01);
+}
+
 TEST(Stream, NullCameraReachesAClientAsConstantGrey) {
   const Sensor sensor({}, false, {"camera.backend=null", "ring.backend=null"});
   client::Client client = sensor.connect();

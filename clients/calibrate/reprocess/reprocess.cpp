@@ -47,6 +47,22 @@ bool measurable(const v1::Frame& frame) {
          !has(frame, v1::HEALTH_REFERENCE_STALE);
 }
 
+/// By what the daemon had decoded the JPEGs smaller (camera.decode_scale): its reference says so.
+int decode_scale_of(const mcap::Reader& file, const calibration::Calibration& calibration) {
+  const auto place = recording::find_attachment(file, recording::kCurrentReferencePng);
+  if (!place) return 1;
+  const image::Grey16 reference =
+      image::decode_png_grey16(file.attachment(*place).data, recording::kCurrentReferencePng);
+  const recon::RectifyTable& table = calibration.model->rectify;
+  for (const int scale : {2, 4}) {
+    if (reference.width * scale == table.frame_width &&
+        reference.height * scale == table.frame_height) {
+      return scale;
+    }
+  }
+  return 1;
+}
+
 /// The file until it is whole: a failure, or Ctrl-C, leaves the one before.
 fs::path part_of(const std::string& output) { return output + ".part"; }
 
@@ -57,8 +73,9 @@ class Reprocessor {
         calibration_(std::make_shared<const calibration::Calibration>(
             calibration::load(options.calibration))),
         file_(options.recording),
-        remaker_(calibration_),
-        decoder_(frame_width(), frame_height()),
+        scale_(decode_scale_of(file_, *calibration_)),
+        remaker_(calibration::for_scaled_frames(calibration_, scale_)),
+        decoder_(frame_width() * scale_, frame_height() * scale_, scale_),
         luma_(frame_width(), frame_height()),
         sink_(part_of(options.output), true),
         writer_(sink_, {.program = context.target.program}) {}
@@ -105,15 +122,20 @@ class Reprocessor {
   }
 
  private:
-  [[nodiscard]] int frame_width() const { return calibration_->model->rectify.frame_width; }
-  [[nodiscard]] int frame_height() const { return calibration_->model->rectify.frame_height; }
+  /// Of the decoded frames.
+  [[nodiscard]] int frame_width() const {
+    return calibration_->model->rectify.frame_width / scale_;
+  }
+  [[nodiscard]] int frame_height() const {
+    return calibration_->model->rectify.frame_height / scale_;
+  }
 
   bool decode(const v1::Frame& frame) {
     const auto status = decoder_.decode(payload_of(frame), luma_.data(), luma_.stride());
     if (status == hal::mjpeg::Status::wrong_size) {
       throw std::runtime_error(fmt::format("{}: its images have another size than the {}x{} of {}",
-                                           options_.recording, frame_width(), frame_height(),
-                                           options_.calibration));
+                                           options_.recording, frame_width() * scale_,
+                                           frame_height() * scale_, options_.calibration));
     }
     return status == hal::mjpeg::Status::ok;
   }
@@ -213,6 +235,7 @@ class Reprocessor {
   const Options& options_;
   std::shared_ptr<const calibration::Calibration> calibration_;
   mcap::Reader file_;
+  int scale_;  // from JPEGs to decoded frames
   DepthReprocessor remaker_;
   hal::mjpeg::GreyDecoder decoder_;
   hal::luma::LumaBuffer luma_;

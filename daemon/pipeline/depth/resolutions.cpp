@@ -65,7 +65,9 @@ Resolutions::Resolutions(const std::shared_ptr<const recon::Model>& model,
                          const recon::CellLattice& lattice, const ReconstructionRules& rules)
     : model_(model), max_error_um_(rules.max_error_um), mean_grey_(mean_grey_of(*model)) {
   // Without another request a sharpened map keeps the resolution at which it is made.
-  const int map = rules.decimation == 0 ? recon::kSharpenedAt : rules.decimation;
+  const int finest = model->frame_scale;
+  const int asked = rules.decimation == 0 ? 0 : std::max(finest, rules.decimation);
+  const int map = asked == 0 ? recon::kSharpenedAt : asked;
   if (rules.sharpen > 0) {
     require_sharpening(*model, rules.sharpen);
     add(lattice, recon::kSharpenedAt, rules.sharpen, map);
@@ -77,18 +79,20 @@ Resolutions::Resolutions(const std::shared_ptr<const recon::Model>& model,
     // The resolution without steps is as coarse as the others: plain at full resolution costs more.
     add(lattice, recon::kSharpenedAt, 0, map);
     for (const int each : steps) add(lattice, recon::kSharpenedAt, each, map);
-  } else if (rules.decimation != 0) {
-    add(lattice, rules.decimation, 0, rules.decimation);
+  } else if (asked != 0) {
+    add(lattice, asked, 0, asked);
   } else {
-    for (const int decimation : {4, 2, 1}) add(lattice, decimation, 0, decimation);
+    for (const int each : {4, 2, 1}) {
+      if (each >= finest) add(lattice, each, 0, each);
+    }
   }
 }
 
 void Resolutions::add(const recon::CellLattice& lattice, int decimation, int steps,
                       int map_decimation) {
-  const auto of = decimation == 1
-                      ? model_
-                      : std::make_shared<const recon::Model>(recon::decimate(*model_, decimation));
+  const int factor = decimation / model_->frame_scale;
+  const auto of =
+      factor == 1 ? model_ : std::make_shared<const recon::Model>(recon::decimate(*model_, factor));
   recon::Reconstructor reconstructor(of, steps);
   recon::TileReaders readers(lattice, of->rectify, reconstructor.radius());
   recon::TileRows tiles(static_cast<std::size_t>(readers.grid().rows()));
@@ -100,8 +104,8 @@ void Resolutions::add(const recon::CellLattice& lattice, int decimation, int ste
       {std::move(reconstructor), std::move(readers), std::move(tiles), {}, std::move(force)});
   if (map_decimation == decimation) return;
   all_.back().coarse = {
-      .upsampler = recon::Upsampler(model_->rectify.width, model_->rectify.height, decimation,
-                                    map_decimation),
+      .upsampler = recon::Upsampler(model_->rectify.width, model_->rectify.height, factor,
+                                    map_decimation / model_->frame_scale),
       .depth_um = std::vector<std::int16_t>(static_cast<std::size_t>(of->rectify.width) *
                                             static_cast<std::size_t>(of->rectify.height)),
       .drawn = {}};
@@ -119,10 +123,11 @@ MapShape Resolutions::shape() const noexcept {
   const Resolution& now = all_[in_use_];
   const recon::RectifyTable& table = now.reconstructor.model().rectify;
   if (!now.coarse) {
-    return {table.width, table.height, table.decimation, now.reconstructor.model().mm_per_px};
+    return {table.width, table.height, now.decimation(), now.reconstructor.model().mm_per_px};
   }
   const recon::Upsampler& to = now.coarse->upsampler;
-  return {to.width(), to.height(), to.decimation(), model_->mm_per_px * to.decimation()};
+  return {to.width(), to.height(), to.decimation() * model_->frame_scale,
+          model_->mm_per_px * to.decimation()};
 }
 
 void Resolutions::set_reference(std::span<const std::uint16_t> reference_q8) noexcept {

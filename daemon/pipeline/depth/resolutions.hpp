@@ -34,7 +34,10 @@ struct Resolution {
   std::optional<recon::ForceMeter> force;  ///< set if the calibration has a force
 
   /// The reconstruction's decimation; the map may be finer.
-  [[nodiscard]] int decimation() const noexcept { return reconstructor.model().rectify.decimation; }
+  [[nodiscard]] int decimation() const noexcept {
+    const recon::Model& model = reconstructor.model();
+    return model.frame_scale * model.rectify.decimation;
+  }
   [[nodiscard]] int steps() const noexcept { return reconstructor.sharpen_steps(); }
 };
 
@@ -57,8 +60,9 @@ class Resolutions {
  public:
   static constexpr std::size_t kMaxResolutions = 3;
 
-  /// Throws std::invalid_argument, saying what to do, where the rules ask for steps of sharpening
-  /// that the model has no LUT for.
+  /// Of scaled frames (recon::Model::frame_scale) no map is finer than they are, whatever the rules
+  /// ask for. Throws std::invalid_argument, saying what to do, where the rules ask for steps of
+  /// sharpening that the model has no LUT for.
   Resolutions(const std::shared_ptr<const recon::Model>& model, const recon::CellLattice& lattice,
               const ReconstructionRules& rules);
 

@@ -148,7 +148,7 @@ def mark_pareto(rows):
 
 
 COLOURS = {"published": "#b2182b", "regression": "#d98200", "list": "#2166ac", "several": "#1b7837",
-           "ours": "#d6409f", "virtual balls": "#8e44ad", "paper": "#222222"}
+           "ours": "#d6409f", "virtual balls": "#8e44ad", "MJPEG": "#0b8a8a", "paper": "#222222"}
 # The wider the smoothing, the paler.
 SHADES = {0.05: 1.0, 0.1: 0.8, 0.2: 0.5, 0.4: 0.28}
 MARKS = {"1/1": "o", "1/2": "s", "1/4": "D"}
@@ -212,6 +212,7 @@ def plot(rows, shots, file, label):
              "list": "sphere alone, one press", "several": "sphere alone, several presses",
              "ours": "ours, one press, sharpened 0 to 2x",
              "virtual balls": "virtual balls (a bound), sharpened 0 to 2x",
+             "MJPEG": "ours from MJPEG, decoding counted",
              "paper": "paper's pipeline, Python + OpenCV"}
     legend = [Line2D([], [], marker="o", linestyle="", color=COLOURS[m], label=names[m])
               for m in names if m in have]

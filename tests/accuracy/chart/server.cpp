@@ -13,6 +13,7 @@
 #include <exception>
 #include <fstream>
 #include <iostream>
+#include <map>
 #include <memory>
 #include <stdexcept>
 #include <string>
@@ -52,15 +53,23 @@ struct Lab {
   image::Grey16 reference = make_reference();
   std::vector<Shot> shots = make_shots();
   std::vector<Setting> settings = make_settings(reference);
+  std::map<int, image::Grey16> references;  // by decode_scale
   std::unique_ptr<Worker> worker;
 
+  const image::Grey16& reference_of(const Setting& setting) {
+    auto found = references.find(setting.decode_scale);
+    if (found == references.end()) {
+      found = references.emplace(setting.decode_scale, reference_for(setting, reference)).first;
+    }
+    return found->second;
+  }
   void use(const std::string& what) {
     const std::size_t bar = what.find('|');
     for (const Shot& shot : shots) {
       if (shot.name != what.substr(0, bar)) continue;
       for (const Setting& setting : settings) {
         if (setting.name != what.substr(bar + 1)) continue;
-        worker = std::make_unique<Worker>(setting, reference, shot);
+        worker = std::make_unique<Worker>(setting, reference_of(setting), shot);
         return;
       }
     }

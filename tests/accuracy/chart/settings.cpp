@@ -6,10 +6,13 @@
 #include <array>
 #include <cmath>
 #include <optional>
+#include <stdexcept>
+#include <utility>
 
 #include "clients/calibrate/fit/build.hpp"
 #include "clients/calibrate/fit/model/auto_build.hpp"
 #include "daemon/recon/model.hpp"
+#include "hal/sim/payload.hpp"
 #include "tests/accuracy/chart/virtual_balls.hpp"
 
 namespace dtact::chart {
@@ -116,7 +119,63 @@ std::vector<Setting> make_settings(const image::Grey16& reference) {
         {fmt::format("several {} tiles 0.10", kShare.at(static_cast<std::size_t>(decimation))),
          "several", decimation, true, 0.1, model});
   }
+  for (const auto& [decimation, scale] :
+       std::vector<std::pair<int, int>>{{1, 1}, {2, 1}, {2, 2}, {4, 1}, {4, 4}}) {
+    const recon::Model frames = scale == 1 ? *ours : recon::for_scaled_frames(*ours, scale);
+    settings.push_back(
+        {fmt::format("MJPEG{} {} tiles 0.10",
+                     scale == 1 ? "" : fmt::format(" decoded at 1/{}", scale),
+                     kShare.at(static_cast<std::size_t>(decimation))),
+         "MJPEG", decimation, true, 0.1,
+         std::make_shared<const recon::Model>(recon::decimate(frames, decimation / scale)), 0,
+         scale});
+  }
   return settings;
+}
+
+JpegShot::JpegShot(const std::vector<image::Grey8>& frames, int decode_scale)
+    : decoder_(kWidth, kHeight, decode_scale),
+      luma_(kWidth / decode_scale, kHeight / decode_scale) {
+  hal::sim::PayloadEncoder encoder(hal::sim::Output::mjpeg, kWidth, kHeight);
+  for (const image::Grey8& frame : frames) {
+    std::vector<std::uint8_t> payload(encoder.capacity());
+    payload.resize(encoder.encode({frame.pixels.data(), kWidth, kHeight, kWidth}, payload));
+    payloads_.push_back(std::move(payload));
+  }
+}
+
+void JpegShot::set_crop(const recon::FrameRegion& crop) noexcept {
+  decoder_.set_crop({crop.x, crop.y, crop.width, crop.height});
+}
+
+hal::LumaView JpegShot::decode(std::size_t frame) {
+  if (decoder_.decode(payloads_[frame], luma_.data(), luma_.stride()) != hal::mjpeg::Status::ok) {
+    throw std::runtime_error("the decoder refuses a frame of the simulated camera");
+  }
+  return luma_.view();
+}
+
+image::Grey16 reference_for(const Setting& setting, const image::Grey16& reference) {
+  if (setting.decode_scale == 0) return reference;
+  constexpr int kFrames = 32;
+  // Not the frames that are judged: the noise of the first ones is that of the shots.
+  JpegShot jpegs(shoot("reference", "", 2 * kFrames).frames, setting.decode_scale);
+  const int width = kWidth / setting.decode_scale;
+  const int height = kHeight / setting.decode_scale;
+  std::vector<std::uint32_t> sum(static_cast<std::size_t>(width) *
+                                 static_cast<std::size_t>(height));
+  for (std::size_t i = 0; i < kFrames; ++i) {
+    const hal::LumaView luma = jpegs.decode(kFrames + i);
+    for (int y = 0; y < height; ++y) {
+      for (int x = 0; x < width; ++x)
+        sum[static_cast<std::size_t>(y * width + x)] += luma.row(y)[x];
+    }
+  }
+  image::Grey16 mean{width, height, {}};
+  for (const std::uint32_t s : sum) {
+    mean.pixels.push_back(static_cast<std::uint16_t>((s * 256 + kFrames / 2) / kFrames));
+  }
+  return mean;
 }
 
 Worker::Worker(const Setting& setting, const image::Grey16& reference, const Shot& shot)
@@ -128,35 +187,42 @@ Worker::Worker(const Setting& setting, const image::Grey16& reference, const Sho
       tiles_(static_cast<std::size_t>(readers_.grid().rows())) {
   reconstructor_.set_reference(reference.pixels);
   cells_.set_reference(reference.pixels);
-  for (const image::Grey8& frame : shot.frames) {
-    frames_.push_back(frame.pixels);
-    frames_.back().resize(frame.pixels.size() + recon::kLumaPadding);
+  if (setting.decode_scale != 0) {
+    jpegs_.emplace(shot.frames, setting.decode_scale);
+    jpegs_->set_crop(cells_.lattice().region());
+  } else {
+    for (const image::Grey8& frame : shot.frames) {
+      frames_.push_back(frame.pixels);
+      frames_.back().resize(frame.pixels.size() + recon::kLumaPadding);
+    }
   }
   const recon::RectifyTable& table = setting.model->rectify;
   depth_um_.resize(static_cast<std::size_t>(table.width) * static_cast<std::size_t>(table.height));
 }
 
 void Worker::once() {
-  const std::uint8_t* luma = frames_[next_].data();
-  next_ = (next_ + 1) % frames_.size();
+  const hal::LumaView luma = jpegs_ ? jpegs_->decode(next_)
+                                    : hal::LumaView{frames_[next_].data(), kWidth, kHeight, kWidth};
+  next_ = (next_ + 1) % shot_.frames.size();
   if (setting_.tiles) {
-    (void)cells_.look({luma, kWidth, kHeight, kWidth});
+    (void)cells_.look(luma);
     readers_.mark(cells_.active(), tiles_);
-    reconstructor_.run_active(luma, kWidth, tiles_, depth_um_, drawn_);
+    reconstructor_.run_active(luma.data, luma.stride, tiles_, depth_um_, drawn_);
   } else {
-    reconstructor_.run(luma, kWidth, depth_um_);
+    reconstructor_.run(luma.data, luma.stride, depth_um_);
   }
 }
 
 Error Worker::error() {
   // The activity check has seen a few frames, as in a running daemon.
-  for (std::size_t i = 0; i < frames_.size(); ++i) once();
+  const std::size_t frames = shot_.frames.size();
+  for (std::size_t i = 0; i < frames; ++i) once();
   Error mean;
-  for (std::size_t i = 0; i < frames_.size(); ++i) {
+  for (std::size_t i = 0; i < frames; ++i) {
     once();
     const Error one = error_of(depth_um_, setting_.decimation, shot_);
-    mean.mean_absolute_mm += one.mean_absolute_mm / static_cast<double>(frames_.size());
-    mean.untrusted_share += one.untrusted_share / static_cast<double>(frames_.size());
+    mean.mean_absolute_mm += one.mean_absolute_mm / static_cast<double>(frames);
+    mean.untrusted_share += one.untrusted_share / static_cast<double>(frames);
   }
   return mean;
 }

@@ -113,11 +113,10 @@ TEST_F(ConfigFile, ASecretMayBeACredential) {
 }
 
 TEST_F(ConfigFile, UnknownKeyNamesFileLineAndWhatIsAllowed) {
-  EXPECT_THAT(
-      error("[camera]\nwidht = 640\n"),
-      AllOf(HasSubstr("c.toml:2:"), HasSubstr("\"camera.widht\""),
-            HasSubstr(
-                "width, height, fps, light_delay_frames, [sim], [replay], [v4l2], [libcamera]")));
+  EXPECT_THAT(error("[camera]\nwidht = 640\n"),
+              AllOf(HasSubstr("c.toml:2:"), HasSubstr("\"camera.widht\""),
+                    HasSubstr("width, height, fps, decode_scale, light_delay_frames, [sim], "
+                              "[replay], [v4l2], [libcamera]")));
   EXPECT_THAT(error("[camra]\n"), AllOf(HasSubstr("c.toml:1:"), HasSubstr("[camera]")));
 }
 
@@ -150,6 +149,16 @@ TEST_F(ConfigFile, SettingsThatExcludeEachOtherAreBothNamed) {
   EXPECT_THAT(
       error("[contact]\nthreshold_mm = 0.04\nrelease_mm = 0.05\n"),
       AllOf(HasSubstr("contact.release_mm = 0.05"), HasSubstr("contact.threshold_mm = 0.04")));
+}
+
+TEST_F(ConfigFile, FramesAreDecodedAtASizeOfWholePixels) {
+  EXPECT_THAT(error("[camera]\nwidth = 642\ndecode_scale = 4\n"),
+              AllOf(HasSubstr("camera.decode_scale = 4"), HasSubstr("642x600")));
+  EXPECT_THAT(error("[camera]\nheight = 482\ndecode_scale = 4\n"), HasSubstr("800x482"));
+  EXPECT_THAT(error("[camera]\ndecode_scale = 3\n"), HasSubstr("camera.decode_scale"));
+  EXPECT_THAT(error("[camera]\nbackend = \"null\"\ndecode_scale = 2\n"),
+              AllOf(HasSubstr("camera.decode_scale = 2"), HasSubstr("camera.backend = \"null\"")));
+  EXPECT_EQ(load("[camera]\nwidth = 642\ndecode_scale = 2\n").hal.camera.decode_scale, 2);
 }
 
 // Several daemons spread over the CPUs unless one is configured.

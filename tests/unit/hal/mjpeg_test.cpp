@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <random>
 #include <stdexcept>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -175,6 +176,67 @@ TEST_F(GreyDecoderTest, ACropHoldsTheSameBitsWhereverItLies) {
       for (int y = 0; y < 48; ++y) ASSERT_EQ(part.row(y)[64], 0) << "beside the picture";
     }
   }
+}
+
+TEST_F(GreyDecoderTest, AScaledPictureHoldsTheMeansOfThePixels) {
+  for (const int scale : {2, 4}) {
+    GreyDecoder scaled(64, 48, scale);
+    luma::LumaBuffer picture(64 / scale, 48 / scale);
+    ASSERT_EQ(scaled.decode(make_jpeg({}, slope), picture.data(), picture.stride()), Status::ok);
+    for (int y = 0; y < 48 / scale; ++y) {
+      for (int x = 0; x < 64 / scale; ++x) {
+        // Of 2x + y: 2 and 1 times the distance from the corner pixel to the middle.
+        const double mean = slope(x * scale, y * scale) + 1.5 * (scale - 1);
+        EXPECT_NEAR(picture.row(y)[x], mean, 3) << scale << ": " << x << ", " << y;
+      }
+    }
+  }
+}
+
+TEST_F(GreyDecoderTest, ACropOfAScaledPictureHoldsTheSameBits) {
+  for (const int scale : {2, 4}) {
+    for (const bool colour : {false, true}) {
+      const Bytes jpeg = make_jpeg({.quality = 60, .colour = colour},
+                                   [](int x, int y) { return 128 + (x * 37 + y * 91) % 100 - 50; });
+      const int width = 64 / scale;
+      const int height = 48 / scale;
+      GreyDecoder scaled(64, 48, scale);
+      luma::LumaBuffer whole(width, height);
+      ASSERT_EQ(scaled.decode(jpeg, whole.data(), whole.stride()), Status::ok);
+      std::minstd_rand random(3);
+      for (int i = 0; i < 300; ++i) {
+        Area crop;
+        crop.x = static_cast<int>(random() % static_cast<unsigned>(width));
+        crop.y = static_cast<int>(random() % static_cast<unsigned>(height));
+        crop.width = 1 + static_cast<int>(random() % static_cast<unsigned>(width - crop.x));
+        crop.height = 1 + static_cast<int>(random() % static_cast<unsigned>(height - crop.y));
+        scaled.set_crop(crop);
+        luma::LumaBuffer part(width + 16, height);
+        ASSERT_EQ(scaled.decode(jpeg, part.data(), part.stride()), Status::ok);
+        for (int y = crop.y; y < crop.y + crop.height; ++y) {
+          ASSERT_TRUE(std::equal(part.row(y) + crop.x, part.row(y) + crop.x + crop.width,
+                                 whole.row(y) + crop.x))
+              << scale << ": " << crop.x << "," << crop.y << " " << crop.width << "x" << crop.height
+              << " row " << y;
+        }
+        for (int y = 0; y < height; ++y) ASSERT_EQ(part.row(y)[width], 0) << "beside the picture";
+      }
+    }
+  }
+}
+
+TEST(GreyDecoder, RefusesAScaleThatDoesNotDivideTheSize) {
+  EXPECT_THROW(GreyDecoder(64, 48, 3), std::invalid_argument);
+  EXPECT_THROW(GreyDecoder(62, 48, 4), std::invalid_argument);
+  EXPECT_THROW(GreyDecoder(64, 46, 4), std::invalid_argument);
+  EXPECT_NO_THROW(GreyDecoder(62, 46, 2));
+}
+
+TEST(GreyDecoder, SaysWhichFramesAreDecodedAtASmallerSize) {
+  EXPECT_EQ(scale_error(1, "GREY"), "");
+  EXPECT_EQ(scale_error(4, "MJPEG"), "");
+  EXPECT_NE(scale_error(2, "YUYV").find("camera.decode_scale = 2: the frames are YUYV"),
+            std::string::npos);
 }
 
 TEST_F(GreyDecoderTest, DamageBelowTheCropIsReported) {

@@ -52,7 +52,7 @@ class LeasingSource final : public Source {
     out.timestamp_ns = base::system_clock().monotonic_ns();
     return DequeueStatus::filled;
   }
-  int queued() const noexcept override {
+  [[nodiscard]] int queued() const noexcept override {
     return static_cast<int>(memory.size() + index_to_requeue.size()) - taken;
   }
   bool enqueue(int index) noexcept override {
@@ -145,6 +145,42 @@ TEST(LiveCamera, IsOpenedAnewOnAThreadThatIsNeitherPinnedNorRealTime) {
   capture.join();
   EXPECT_TRUE(CPU_EQUAL(&seen, &allowed));
   EXPECT_EQ(policy, SCHED_OTHER);
+}
+
+TEST(LiveCamera, RefusesToDecodeRawFramesAtASmallerSize) {
+  CameraConfig config = small();
+  config.decode_scale = 2;
+  const auto source = std::make_shared<LeasingSource>();
+  LiveCamera camera(config, "test", "nothing yet",
+                    [&]() -> Opened { return {source, "the one", "GREY", {}}; });
+  try {
+    camera.start();
+    FAIL() << "raw frames have one size";
+  } catch (const ModeError& e) {
+    EXPECT_NE(std::string(e.what()).find("camera.decode_scale = 2: the frames are GREY"),
+              std::string::npos);
+  }
+}
+
+TEST(LiveCamera, DecodesJpegsAtASmallerSize) {
+  const std::vector<std::uint8_t> jpeg = fakes::make_jpeg(
+      {.width = kSide, .height = kSide, .colour = false}, [](int, int) { return 90; });
+  CameraConfig config = small();
+  config.decode_scale = 4;
+  const auto source = std::make_shared<LeasingSource>();
+  source->encoding = Encoding::jpeg;
+  LiveCamera camera(config, "test", "nothing yet",
+                    [&]() -> Opened { return {source, "the one", "MJPEG", {}}; });
+  camera.start();
+  EXPECT_EQ(camera.info().width, kSide / 4);
+  EXPECT_EQ(camera.info().decode_scale, 4);
+  source->fill(0, jpeg);
+  Frame frame;
+  ASSERT_EQ(camera.grab(frame, milliseconds(100)), GrabStatus::ok);
+  EXPECT_EQ(frame.luma().width, kSide / 4);
+  EXPECT_EQ(frame.luma().height, kSide / 4);
+  EXPECT_NEAR(frame.luma().row(3)[3], 90, 1);
+  EXPECT_EQ(frame.jpeg().size(), jpeg.size());
 }
 
 TEST(LiveCamera, LendsFullRangeLumaWithoutACopy) {

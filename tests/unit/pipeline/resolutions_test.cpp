@@ -59,6 +59,43 @@ TEST(Resolutions, ArePlainWithoutSharpening) {
               ElementsAre(MapVariant{4, 0, 4}, MapVariant{2, 0, 2}, MapVariant{1, 0, 1}));
 }
 
+/// As decoded at 1/scale of the size.
+Calibration scaled(const Calibration& calibration, int scale) {
+  auto made = std::make_shared<calibration::Calibration>(*calibration);
+  made->model =
+      std::make_shared<const recon::Model>(recon::for_scaled_frames(*calibration->model, scale));
+  return made;
+}
+
+TEST(Resolutions, AreNoFinerThanTheFrames) {
+  const Calibration half = scaled(fakes::scattering_toy_calibration(15), 2);
+  EXPECT_THAT(resolutions(half, 1, 0), ElementsAre(MapVariant{2, 0, 2}));
+  EXPECT_THAT(resolutions(half, 2, 0), ElementsAre(MapVariant{2, 0, 2}));
+  EXPECT_THAT(resolutions(half, 4, 0), ElementsAre(MapVariant{4, 0, 4}));
+  EXPECT_THAT(resolutions(half, 0, 0), ElementsAre(MapVariant{4, 0, 4}, MapVariant{2, 0, 2}));
+  EXPECT_THAT(resolutions(half, 1, 1), ElementsAre(MapVariant{4, 1, 2}));
+  const Calibration quarter = scaled(fakes::scattering_toy_calibration(15), 4);
+  EXPECT_THAT(resolutions(quarter, 0, 0), ElementsAre(MapVariant{4, 0, 4}));
+  EXPECT_THAT(resolutions(quarter, 1, kAuto),
+              ElementsAre(MapVariant{4, 0, 4}, MapVariant{4, 1, 4}, MapVariant{4, 2, 4}));
+}
+
+TEST(Resolutions, OfScaledFramesHaveTheSameMillimetres) {
+  const Calibration whole = fakes::scattering_toy_calibration(15);
+  for (const int map : {2, 4}) {
+    const auto shape = [map](const Calibration& of) {
+      return Resolutions(of->model, CalibratedImage(of).cells.lattice(), {.decimation = map})
+          .shape();
+    };
+    const MapShape expected = shape(whole);
+    const MapShape got = shape(scaled(whole, 2));
+    EXPECT_EQ(got.width, expected.width);
+    EXPECT_EQ(got.height, expected.height);
+    EXPECT_EQ(got.decimation, expected.decimation);
+    EXPECT_DOUBLE_EQ(got.mm_per_px, expected.mm_per_px);
+  }
+}
+
 TEST(Resolutions, SharpenAtAQuarterForTheMapOfTheMethod) {
   const Calibration toy = fakes::scattering_toy_calibration(15);
   for (const int steps : {1, 2}) {

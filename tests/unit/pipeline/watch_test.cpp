@@ -345,6 +345,25 @@ TEST(Activate, NamesAFrameSizeThatDoesNotFit) {
   }
 }
 
+TEST(Activate, TakesACalibrationForTheJpegsOrForTheDecodedFrames) {
+  hal::CameraInfo camera;
+  camera.width = fakes::kToyWidth / 2;
+  camera.height = fakes::kToyHeight / 2;
+  camera.decode_scale = 2;
+  const auto toy = fakes::toy_calibration();
+  const auto active = activate(toy, camera, {});
+  const recon::Model& model = *active->image.calibration->model;
+  EXPECT_EQ(model.rectify.frame_width, fakes::kToyWidth / 2);
+  EXPECT_EQ(model.frame_scale, 2);
+  EXPECT_EQ(active->maps.shape().decimation, 2);
+  EXPECT_FALSE(active->camera_mismatch);
+
+  const auto own = std::make_shared<const calibration::Calibration>(*active->image.calibration);
+  EXPECT_EQ(activate(own, camera, {})->image.calibration, own) << "made for these frames";
+  camera.decode_scale = 1;
+  EXPECT_THROW((void)activate(toy, camera, {}), std::invalid_argument);
+}
+
 TEST(Activate, KnowsTheCellsOfTheCalibratedPart) {
   hal::CameraInfo camera;
   camera.width = 160;

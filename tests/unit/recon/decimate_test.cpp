@@ -38,6 +38,66 @@ std::vector<std::int16_t> run(const Model& model, int (*grey)(int, int)) {
   return depth;
 }
 
+/// The depth that the model for frames of 1/scale the size makes of the means of run()'s pixels.
+std::vector<std::int16_t> run_scaled(const Model& model, int scale, int (*grey)(int, int)) {
+  const Model scaled = for_scaled_frames(model, scale);
+  std::vector<std::uint8_t> luma;
+  for (int y = 0; y < 20; y += scale) {
+    for (int x = 0; x < 24; x += scale) {
+      int sum = scale * scale / 2;
+      for (int i = 0; i < scale * scale; ++i) sum += grey(x + i % scale, y + i / scale);
+      luma.push_back(static_cast<std::uint8_t>(sum / (scale * scale)));
+    }
+  }
+  luma.resize(luma.size() + 64);
+  Reconstructor reconstructor(std::make_shared<const Model>(scaled));
+  std::vector<std::int16_t> depth(
+      static_cast<std::size_t>(scaled.rectify.width * scaled.rectify.height));
+  reconstructor.run(luma.data(), 24 / scale, depth);
+  return depth;
+}
+
+// The map begins at column 2 and row 3, so that rows are read between two of the scaled frame.
+TEST(ScaledFrames, GiveTheDecimatedMapOfAPlaneAnywhere) {
+  const auto plane = [](int x, int y) { return 150 - x - 3 * y; };
+  for (const int scale : {2, 4}) {
+    const auto expected = run(decimate(straight_model(), scale), plane);
+    const auto depth = run_scaled(straight_model(), scale, plane);
+    ASSERT_EQ(depth.size(), expected.size());
+    for (std::size_t i = 0; i < depth.size(); ++i) {
+      EXPECT_NEAR(depth[i], expected[i], 20) << scale << ", pixel " << i;  // 0.6 grey levels
+    }
+  }
+}
+
+TEST(ScaledFrames, KeepMillimetresSmoothingAndMarks) {
+  Model model = straight_model();
+  model.smoothing_px = 2;
+  model.untrusted.assign(std::size_t{16} * 12, 0);
+  model.untrusted[16 * 5 + 3] = 1;
+  const Model half = for_scaled_frames(model, 2);
+  EXPECT_EQ(half.rectify.frame_width, 12);
+  EXPECT_EQ(half.rectify.frame_height, 10);
+  EXPECT_EQ(half.rectify.width, 8);
+  EXPECT_EQ(half.rectify.height, 6);
+  EXPECT_EQ(half.rectify.entries.size(), 8U * 6U);
+  EXPECT_EQ(half.frame_scale, 2);
+  EXPECT_DOUBLE_EQ(half.mm_per_px, 0.1);
+  EXPECT_DOUBLE_EQ(half.smoothing_px, 1);
+  EXPECT_EQ(half.untrusted[8 * 2 + 1], 1);
+  EXPECT_EQ(half.reference_q8, std::vector<std::uint16_t>(std::size_t{12} * 10, 150 * 256));
+  EXPECT_NO_THROW(check(half));
+  EXPECT_EQ(decimate(half, 2).rectify.width, 4);
+}
+
+TEST(ScaledFrames, AreMultiplesOfTheScale) {
+  Model model = straight_model();
+  EXPECT_THROW((void)for_scaled_frames(model, 3), std::invalid_argument);
+  model.rectify = make_crop_table(23, 20, 2, 3, 16, 12);
+  model.reference_q8.assign(std::size_t{23} * 20, 150 * 256);
+  EXPECT_THROW((void)for_scaled_frames(model, 2), std::invalid_argument);
+}
+
 TEST(Decimate, KeepsMillimetresAndDropsWhatFillsNoPixel) {
   Model model = straight_model();
   model.rectify = make_crop_table(24, 20, 2, 3, 15, 11);

@@ -107,6 +107,39 @@ TEST_F(SimCameraTest, EveryOutputDecodesToNearlyTheSameLuma) {
   EXPECT_GE(c.info().decode_ns, 0);
 }
 
+TEST_F(SimCameraTest, JpegsAreDecodedAtHalfTheSize) {
+  CameraConfig half = config("", "mjpeg");
+  half.decode_scale = 2;
+  SimCamera camera(half, link_);
+  EXPECT_EQ(camera.info().width, 80);
+  EXPECT_EQ(camera.info().height, 60);
+  EXPECT_EQ(camera.info().decode_scale, 2);
+  SimCamera whole(config("", "mjpeg"), link_);
+  Frame frame;
+  Frame full;
+  ASSERT_EQ(camera.grab(frame, 1s), GrabStatus::ok);
+  ASSERT_EQ(whole.grab(full, 1s), GrabStatus::ok);
+  ASSERT_EQ(frame.luma().width, 80);
+  ASSERT_EQ(frame.luma().height, 60);
+  EXPECT_TRUE(std::ranges::equal(frame.jpeg(), full.jpeg()));
+  for (int y = 0; y < 60; ++y) {
+    for (int x = 0; x < 80; ++x) {
+      const std::uint8_t* const upper = full.luma().row(2 * y) + 2 * x;
+      const std::uint8_t* const lower = full.luma().row(2 * y + 1) + 2 * x;
+      const double mean = (upper[0] + upper[1] + lower[0] + lower[1]) / 4.0;
+      ASSERT_NEAR(frame.luma().row(y)[x], mean, 6) << x << ", " << y;
+    }
+  }
+}
+
+TEST_F(SimCameraTest, RawFramesAreNotDecodedAtASmallerSize) {
+  CameraConfig half = config("", "yuyv");
+  half.decode_scale = 2;
+  EXPECT_THAT(
+      [&] { const SimCamera camera(half, link_); },
+      testing::ThrowsMessage<std::runtime_error>(testing::HasSubstr("the frames are YUYV")));
+}
+
 TEST_F(SimCameraTest, OddSizesAreWholePictures) {
   CameraConfig settings = config("", "mjpeg");
   settings.width = 150;
