@@ -1,5 +1,6 @@
 // A camera's JPEG payload, four bytes of crop before it. A bad frame leaves no state in the
-// decoder, and a crop gives the same pixels as the whole picture.
+// decoder, and a crop gives the same pixels as the whole picture, at each size that frames are
+// decoded at.
 #include <algorithm>
 #include <array>
 
@@ -18,9 +19,15 @@ using Picture = std::array<std::uint8_t, std::size_t{kWidth} * kHeight>;
 
 class Decoder {
  public:
-  Decoder() { require(decode(good_, expected_) == Status::ok, "the test's own picture decodes"); }
+  explicit Decoder(int scale)
+      : width_(kWidth / scale), height_(kHeight / scale), decoder_(kWidth, kHeight, scale) {
+    require(decode(good_, expected_) == Status::ok, "the test's own picture decodes");
+  }
 
-  void try_one(const hal::Area& crop, std::span<const std::uint8_t> payload) {
+  void try_one(std::span<const std::uint8_t, 4> place, std::span<const std::uint8_t> payload) {
+    hal::Area crop{place[0] % width_, place[1] % height_, 0, 0};
+    crop.width = 1 + place[2] % (width_ - crop.x);
+    crop.height = 1 + place[3] % (height_ - crop.y);
     Picture whole{};
     Picture part{};
     const Status status = decode(payload, whole);
@@ -29,7 +36,7 @@ class Decoder {
     decoder_.set_crop({});
     if (status == Status::ok) {
       for (int y = crop.y; y < crop.y + crop.height; ++y) {
-        const std::ptrdiff_t begin = std::ptrdiff_t{y} * kWidth + crop.x;
+        const std::ptrdiff_t begin = std::ptrdiff_t{y} * width_ + crop.x;
         require(std::equal(whole.begin() + begin, whole.begin() + begin + crop.width,
                            part.begin() + begin),
                 "a crop gives what the whole picture has there");
@@ -47,10 +54,12 @@ class Decoder {
 
  private:
   Status decode(std::span<const std::uint8_t> payload, Picture& out) {
-    return decoder_.decode(payload, out.data(), kWidth);
+    return decoder_.decode(payload, out.data(), width_);
   }
 
-  hal::mjpeg::GreyDecoder decoder_{kWidth, kHeight};
+  int width_;
+  int height_;
+  hal::mjpeg::GreyDecoder decoder_;
   std::vector<std::uint8_t> good_ = fakes::make_jpeg({.width = kWidth, .height = kHeight},
                                                      [](int x, int y) { return 4 * x + 3 * y; });
   Picture expected_{};
@@ -61,11 +70,9 @@ class Decoder {
 
 int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace dtact::fuzz;
-  static Decoder decoder;
+  static std::array<Decoder, 3> decoders{Decoder(1), Decoder(2), Decoder(4)};
   if (size < 4) return 0;
-  dtact::hal::Area crop{data[0] % kWidth, data[1] % kHeight, 0, 0};
-  crop.width = 1 + data[2] % (kWidth - crop.x);
-  crop.height = 1 + data[3] % (kHeight - crop.y);
-  decoder.try_one(crop, {data + 4, size - 4});
+  const std::span<const std::uint8_t> input(data, size);
+  for (Decoder& decoder : decoders) decoder.try_one(input.first<4>(), input.subspan(4));
   return 0;
 }
