@@ -204,6 +204,30 @@ class Aio(unittest.IsolatedAsyncioTestCase):
         self.assertLess(attempts.call_count, 8)
         await s.close()
 
+    async def test_a_daemon_that_ends_each_connection_is_not_crowded(self):
+        with FakeDaemon() as daemon:
+            async with dtact.aio.connect(daemon.address, reconnect=True) as s:
+                await s.subscribe()
+                daemon.ends_behind = "subscribe"
+                daemon.drop()
+                until = time.monotonic() + 0.6
+                while time.monotonic() < until:
+                    await s.next(0.05)
+                self.assertTrue(2 < daemon.connections < 8, daemon.connections)
+
+    async def test_to_nobody_at_any_address_of_a_host(self):
+        with socket.create_server(("127.0.0.1", 0)) as server:
+            port = server.getsockname()[1]
+        look_up = socket.getaddrinfo
+
+        def both(host, *arguments, **options):
+            return [found for address in ("127.0.0.1", "127.0.0.2")
+                    for found in look_up(address, *arguments, **options)]
+        with mock.patch("socket.getaddrinfo", both):
+            with self.assertRaisesRegex(dtact.ConnectionError,
+                                        f"nothing listens on localhost port {port}"):
+                await dtact.aio.connect(f"localhost:{port}").__aenter__()
+
     async def test_unix_socket(self):
         with tempfile.TemporaryDirectory() as folder, FakeDaemon(path=f"{folder}/socket") as daemon:
             async with dtact.aio.connect(daemon.address, token="t", kept_frames=2) as s:

@@ -94,6 +94,22 @@ class Reading(unittest.TestCase):
         camera.connect()
         self.assertEqual(camera.read_latest_depth(10_000).shape, (2, 2, 1))
 
+    def test_connect_completes_anew_what_was_left_out(self):
+        def status(request, reply):
+            reply.status.state, reply.status.camera.fps = 3, 30
+            reply.status.calibration.width = reply.status.calibration.height = 16
+        cameras = [self.camera(), self.camera(width=2, height=2)]
+        self.daemon.answers["get_status"] = status
+        for camera in cameras:
+            camera.disconnect()
+        cameras[0].connect()
+        self.assertEqual((cameras[0].width, cameras[0].height, cameras[0].fps), (16, 16, 30))
+        with self.assertRaisesRegex(ValueError, "2 × 2 is no size of this daemon's depth"):
+            cameras[1].connect()
+        cameras[1].width = cameras[1].height = 4
+        cameras[1].connect()
+        self.assertEqual((cameras[1].width, cameras[1].fps), (4, 30))
+
     def test_sizes_and_rates(self):
         self.camera(width=1, height=1, fps=20)
         sent = self.daemon.requests[-1].subscribe

@@ -125,6 +125,30 @@ class Breaking(unittest.TestCase):
         self.assertTrue(2 < attempts.call_count < 8, attempts.call_count)
         s.close()
 
+    def test_a_daemon_that_ends_each_connection_is_not_crowded(self):
+        with FakeDaemon() as daemon, dtact.connect(daemon.address, reconnect=True) as s:
+            s.subscribe()
+            daemon.ends_behind = "subscribe"
+            daemon.drop()
+            until = time.monotonic() + 0.6
+            while time.monotonic() < until:
+                s.next(0.05)
+            self.assertTrue(2 < daemon.connections < 8, daemon.connections)
+            while s._link is not None:
+                s.next(0.05)
+            daemon.ends_behind = ""
+            s._next_attempt += 60
+            self.assertEqual(s.status().state, "serving")  # A request does not wait.
+            # Once a connection has lasted, the waits begin with the shortest.
+            s._opened_at -= 10
+            s._next_attempt = 0
+            daemon.drop()
+            while not isinstance(s.next(5), dtact.Reconnected):
+                pass
+            while s.next(0.05) is not None:
+                pass
+            self.assertLess(s._next_attempt - s._opened_at, 0.11)
+
     def test_no_use_after_close(self):
         with FakeDaemon() as daemon:
             s = dtact.connect(daemon.address, reconnect=True)

@@ -1,4 +1,5 @@
 """The client that waits, against a daemon that does as a test says."""
+import errno
 import itertools
 import os
 import pathlib
@@ -298,6 +299,20 @@ class Requests(unittest.TestCase):
             self.assertEqual(daemon.requests[-1].upload_calibration.name, "mine")
             s.activate_calibration(0)
             self.assertTrue(daemon.requests[-1].activate_calibration.HasField("number"))
+
+    def test_a_calibration_that_cannot_be_written_leaves_the_one_before(self):
+        with tempfile.TemporaryDirectory() as folder:
+            before = dtact.CalibrationFiles(pathlib.Path(folder).name, b"t", b"p")
+            before.write(folder)
+            full = OSError(errno.ENOSPC, "No space left on device")
+            with mock.patch("os.fsync", side_effect=[None, full]), self.assertRaises(OSError):
+                dtact.CalibrationFiles("c", b"other", b"other").write(folder)
+            self.assertEqual(dtact.CalibrationFiles.read(folder), before)
+            self.assertEqual(sorted(os.listdir(folder)), ["calibration.toml", "reference.png"])
+            dtact.CalibrationFiles("c", b"new t", b"new p").write(folder)
+            read = dtact.CalibrationFiles.read(folder)
+            self.assertEqual((read.calibration_toml, read.reference_png), (b"new t", b"new p"))
+            self.assertEqual(sorted(os.listdir(folder)), ["calibration.toml", "reference.png"])
 
     def test_every_part_of_a_subscription_is_sent(self):
         with FakeDaemon() as daemon, dtact.connect(daemon.address) as s:

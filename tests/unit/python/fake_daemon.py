@@ -41,6 +41,7 @@ class FakeDaemon:
         self.requests = []
         self.pushed = []
         self.answers = {}  # request kind → function (request, Reply message); False: no answer
+        self.ends_behind = ""  # The kind of request behind whose answer it ends the connection.
         self.connections = 0
         self.ended = 0  # Number of connections that ended.
         self._connection = None
@@ -133,6 +134,8 @@ class FakeDaemon:
             # In one piece, so that drop() comes after all of it.
             behind = self.pushed if kind == "subscribe" else []
             connection.sendall(b"".join(packed(m) for m in [message, *behind]))
+            if kind == self.ends_behind:
+                raise EOFError
 
 
 @contextlib.contextmanager

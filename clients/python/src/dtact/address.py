@@ -37,6 +37,12 @@ def parse(text: str) -> Address:
         host, _, port = text.partition(":")
     if not host or (text.endswith(":") and not port and text.count(":") == 1):
         raise ValueError(f'"{text}" is no address: write "host", "host:port" or "unix:/path"')
+    if ":" not in host:
+        try:
+            host.encode("idna")  # As connecting does, where the error would not name the host.
+        except UnicodeError as e:
+            raise ValueError(f'"{host}" is no name of a host: each part between dots has 1 to 63 '
+                             "characters") from e
     if not port:
         return Address(host)
     if not port.isascii() or not port.isdigit() or not 1 <= int(port) <= 65535:

@@ -11,6 +11,8 @@ from __future__ import annotations
 
 import asyncio
 import builtins
+import errno
+import re
 import threading
 import time
 from collections.abc import AsyncIterator, Callable, Sequence
@@ -41,6 +43,14 @@ _Item = TypeVar("_Item")
 
 #: Turns of the loop to read what lies ready: the newest frames count, and calls have to end.
 _MAX_TURNS = 4096
+
+
+def _common(error: OSError) -> OSError:
+    """asyncio puts what several addresses of a host said into one text. The refusal, where all refused."""
+    codes: list[str] = re.findall(r"\[Errno (\d+)\]", str(error)) if error.errno is None else []
+    if codes and all(int(code) == errno.ECONNREFUSED for code in codes):
+        return ConnectionRefusedError(errno.ECONNREFUSED, str(error))
+    return error
 
 
 class _Link(asyncio.BufferedProtocol):
@@ -319,7 +329,7 @@ class Client(Session):
             except ConnectionError:
                 raise
             except OSError as e:
-                raise self._cannot_connect(e) from e
+                raise self._cannot_connect(_common(e)) from e
             server = await self._exchange(self._hello())
             self._server = server
             if self._subscription is not None:

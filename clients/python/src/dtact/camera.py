@@ -22,6 +22,7 @@ from .client import Client
 from .errors import ConnectionError, Error, NoFrame
 from .frame import Frame
 from .subscription import Subscription
+from .values import Status
 
 #: The depth that is shown as the brightest colour, as in recordings' pictures.
 SHOWN_MM = 2.0
@@ -45,6 +46,16 @@ def colour(depth_mm: NDArray[np.float32]) -> NDArray[np.uint8]:
     return _TABLE[np.clip(shade, 0, 255).astype(np.uint8)]
 
 
+def _finest(status: Status) -> int:
+    """By what the finest depth map is smaller than the calibration's: reconstruction.resolution and
+    camera.decode_scale."""
+    size, camera = status.calibration, status.message.camera
+    finest = {"half": 2, "quarter": 4}.get(status.message.reconstruction.resolution, 1)
+    if size and size.frame_width and camera.width:
+        finest = max(finest, size.frame_width // camera.width)
+    return finest
+
+
 def _of_this_machine() -> list[dict[str, Any]]:
     try:
         with Client(timeout=1.0, program="dtact find_cameras") as client:
@@ -52,14 +63,15 @@ def _of_this_machine() -> list[dict[str, Any]]:
     except Error:
         return []
     size = status.calibration
+    finest = _finest(status)
     return [{
         "name": server.name or f"dtact {server.serial}".strip(),
         "type": "dtact",
         "id": DEFAULT_HOST,
         "serial": server.serial,
         "default_stream_profile": {
-            "width": size.width if size else None,
-            "height": size.height if size else None,
+            "width": size.width // finest if size else None,
+            "height": size.height // finest if size else None,
             "fps": status.fps,
         },
     }]
@@ -109,6 +121,7 @@ class Camera:
         self.fps = fps
         self.width = width
         self.height = height
+        self._left_out: list[str] = []  # What the last connection set of these three.
         self.use_rgb = use_rgb
         self.use_depth = use_depth
         self._camera_picture = picture == "camera"
@@ -238,13 +251,17 @@ class Camera:
 
     def _subscription(self, client: Client) -> Subscription:
         """What is asked of the daemon; completes fps, width and height."""
+        for name in self._left_out:  # The daemon may have others by now.
+            setattr(self, name, None)
+        self._left_out = [name for name in ("fps", "width", "height") if getattr(self, name) is None]
         status = client.status()
         size = status.message.camera if self._camera_picture else status.calibration
         if size is None:
             raise ConnectionError(f"{self}: the daemon has no calibration. {status.advice}")
+        finest = 1 if self._camera_picture else _finest(status)
         if self.width is None and self.height is None:
-            self.width, self.height = size.width, size.height
-        divisors = (1,) if self._camera_picture else (4, 2, 1)
+            self.width, self.height = size.width // finest, size.height // finest
+        divisors = [1] if self._camera_picture else [d for d in (4, 2, 1) if d >= finest]
         sizes = {(size.width // d, size.height // d): d for d in divisors}
         decimation = sizes.get((self.width or 0, self.height or 0))
         if decimation is None:

@@ -31,6 +31,9 @@ from .values import Server, Status
 
 #: Calibrations take the daemon seconds.
 _SLOW_S = 30.0
+#: The longest wait between attempts to connect again. After a connection that lasted longer the waits
+#: begin with the shortest.
+_LONGEST_WAIT_S = 5.0
 # What more attempts to connect do not fix.
 _FINAL = (ProtocolError, IdentityError, Denied)
 _MAX_TOKEN_BYTES = 256
@@ -45,7 +48,7 @@ class BackOff:
 
     def next(self) -> float:
         wait = self._next * random.uniform(0.5, 1.0)
-        self._next = min(2 * self._next, 5.0)
+        self._next = min(2 * self._next, _LONGEST_WAIT_S)
         return wait
 
 
@@ -112,6 +115,7 @@ class Session:
         # Shared by all calls and tasks: polling with short time-outs does not shorten the back-off.
         self._back_off = BackOff()
         self._next_attempt = 0.0  # time.monotonic()
+        self._opened_at = 0.0  # time.monotonic()
         self._process = os.getpid()
         self._begin()
 
@@ -180,6 +184,8 @@ class Session:
         self._broken = error
         if self._server is not None and self._lost_at is None:
             self._lost_at, self._lost_because = time.monotonic(), str(error)
+            if self._lost_at - self._opened_at > _LONGEST_WAIT_S:
+                self._back_off = BackOff()
 
     def _note_failure(self) -> None:
         """Records a failed attempt to connect."""
@@ -187,12 +193,13 @@ class Session:
 
     def _note_return(self) -> None:
         """Adds a Reconnected event if there was a connection before."""
-        self._back_off = BackOff()
-        self._next_attempt = 0.0
+        self._opened_at = time.monotonic()
         if self._lost_at is not None:
+            # A daemon that takes connections and ends them is not crowded either.
+            self._next_attempt = self._opened_at + self._back_off.next()
             self._conversation.tell(Reconnected(
                 self._conversation.last_sequence, None, None, self._lost_because,
-                time.monotonic() - self._lost_at))
+                self._opened_at - self._lost_at))
         self._lost_at = None
 
     def _patience(self, request: Request[T]) -> float:

@@ -2,6 +2,7 @@
 at the centre of the depth map, x to the right, y down, as the camera sees it."""
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
 from datetime import datetime, timedelta, timezone
 from pathlib import Path
@@ -201,11 +202,22 @@ class CalibrationFiles:
                    (folder / "reference.png").read_bytes())
 
     def write(self, folder: str | Path) -> None:
-        """Into a folder, which is made."""
+        """Into a folder, which is made. Files there are replaced once both are written."""
         folder = Path(folder)
         folder.mkdir(parents=True, exist_ok=True)
-        (folder / "calibration.toml").write_bytes(self.calibration_toml)
-        (folder / "reference.png").write_bytes(self.reference_png)
+        files = {"calibration.toml": self.calibration_toml, "reference.png": self.reference_png}
+        parts = {name: folder / f".{name}.{os.getpid()}.part" for name in files}
+        try:
+            for name, data in files.items():
+                with parts[name].open("wb") as part:
+                    part.write(data)
+                    part.flush()
+                    os.fsync(part.fileno())
+            for name, path in parts.items():
+                os.replace(path, folder / name)
+        finally:
+            for path in parts.values():
+                path.unlink(missing_ok=True)
 
 
 @dataclass(frozen=True)
@@ -261,7 +273,7 @@ class Server:
     major: int
     minor: int
     features: frozenset[str]  #: what it can do that others cannot; proto/README.md lists the names
-    rights: str  #: "view" or "control"
+    rights: str  #: "view", "control" or "calibrate"
     name: str
     serial: str  #: the camera's serial number; empty if it has none
     frame_id: str  #: id of the surface frame
