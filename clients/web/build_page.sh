@@ -10,6 +10,7 @@ find "$work" -mindepth 1 -maxdepth 1 ! -name node_modules -exec rm -rf {} +
 tar -C "$sources" --exclude=./node_modules --exclude=./gen -c . | tar -C "$work" -x
 cd "$work"
 say() { echo "build_page.sh: $*" >&2; }
+command -v "$npm" >/dev/null || { say "there is no $npm: apt-get install nodejs npm"; exit 1; }
 if ! cmp -s package-lock.json node_modules/.installed; then
   "$npm" ci --ignore-scripts --no-audit --no-fund --loglevel=error >&2 || {
     say "npm cannot install what the page is built with: it needs the network once, or a registry (npm config" \

@@ -53,6 +53,7 @@ class Source : public std::enable_shared_from_this<Source> {
   [[nodiscard]] const client::Options& options() const noexcept { return options_; }
   /// No callback is called afterwards.
   void stop();
+  [[nodiscard]] boost::asio::io_context& io() const noexcept { return io_; }
   /// One for each `who`, until unfollow().
   void follow(const void* who, Follower follower) { followers_[who] = std::move(follower); }
   void unfollow(const void* who) { followers_.erase(who); }

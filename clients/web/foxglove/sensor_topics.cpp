@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <chrono>
 #include <utility>
 #include <vector>
 
@@ -10,7 +11,15 @@
 
 namespace dtact::web::foxglove {
 
-SensorTopics::SensorTopics(std::shared_ptr<Source> source) : source_(std::move(source)) {}
+namespace {
+
+/// As long as the page's: places of a daemon that has none become free.
+constexpr std::chrono::seconds kRetry{5};
+
+}  // namespace
+
+SensorTopics::SensorTopics(std::shared_ptr<Source> source)
+    : source_(std::move(source)), retry_(source_->io()) {}
 
 void SensorTopics::start() {
   source_->follow(this, {.changed = [this] { on_changed(); },
@@ -18,6 +27,7 @@ void SensorTopics::start() {
 }
 
 void SensorTopics::stop() {
+  retry_.cancel();
   source_->unfollow(this);
   source_->leave(this);
   listeners_.clear();
@@ -53,9 +63,18 @@ void SensorTopics::update() {
         }
         refused_ = true;
         asked_.clear();
+        ask_again_later();
         publish_state(false, reply.error().message());
       },
       [this](const RelayedFrame& frame, std::uint64_t) { on_frame(frame); });
+}
+
+void SensorTopics::ask_again_later() {
+  retry_.expires_after(kRetry);
+  retry_.async_wait([weak = weak_from_this()](const boost::system::error_code& error) {
+    const auto self = weak.lock();
+    if (!error && self != nullptr) self->update();
+  });
 }
 
 void SensorTopics::on_changed() {

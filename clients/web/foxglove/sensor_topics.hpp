@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <boost/asio/steady_timer.hpp>
 #include <map>
 #include <memory>
 #include <string>
@@ -12,7 +13,7 @@ namespace dtact::web::foxglove {
 
 /// One daemon's channels. Makes each message once for all subscribers, and requests only subscribed
 /// parts from the daemon. Runs on the thread of the gateway's `io`.
-class SensorTopics {
+class SensorTopics : public std::enable_shared_from_this<SensorTopics> {
  public:
   class Listener {
    public:
@@ -47,12 +48,14 @@ class SensorTopics {
   void publish(Topic topic, const std::shared_ptr<const Message>& message);
   void publish_state(bool well, const std::string& sentence);
   void update();
+  void ask_again_later();
   [[nodiscard]] Topics wanted() const;
 
   std::shared_ptr<Source> source_;
   std::map<Listener*, Topics> listeners_;
   std::string asked_;     ///< The Subscribe that the daemon knows, serialized.
   bool refused_ = false;  ///< The last one was.
+  boost::asio::steady_timer retry_;
   std::shared_ptr<const Message> light_;
   bool points_shown_ = false;  ///< The last points were some.
 };

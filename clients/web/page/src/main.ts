@@ -105,6 +105,12 @@ class Page {
     // At first as many as fit beside each other.
     const first = chosen.length > 0 ? chosen : names.slice(0, 2);
     const fresh = this.buttons.size === 0;
+    // The gateway may have been started again with other sensors.
+    for (const [name, made] of this.buttons) {
+      if (names.includes(name)) continue;
+      made.remove();
+      this.buttons.delete(name);
+    }
     for (const { name, connected, error } of sensors) {
       let made = this.buttons.get(name);
       if (!made) {

@@ -346,6 +346,9 @@ export class Pane {
     this.servesPoints = hello.features.includes("cloud");
     if (this.servesPoints) return void this.lookAtPoints();
     this.lookAtMaps();
+    // That of another run of the daemon, or one that could not be had before.
+    this.stage.reference = undefined;
+    void this.fetchReference();
     void this.quality.ask(this.sensor);
     void this.calibrations.refresh();
   }

@@ -152,7 +152,7 @@ export class Connection {
     this.tell();
   }
 
-  private tell(): void {
+  tell(): void {
     if (!this.ready) return;
     const why = this.why && `: ${this.why}`;
     const away = `The sensor is away${why}. It goes on by itself when it is back.`;

@@ -42,6 +42,7 @@ class Session {
   private retry: ReturnType<typeof setTimeout> | undefined;
   /** The page has not taken the last frame yet. */
   private underWay = false;
+  private broken = false; // the newest frame was
   private waiting: WireFrame | undefined;
   private gaveWay = 0;
   private recorder: Recorder | undefined;
@@ -258,7 +259,10 @@ class Session {
       if (shown.cloud) memory.push(shown.cloud.values.buffer);
       this.underWay = true;
       post({ kind: "frame", frame: shown }, memory);
+      if (this.broken) this.connection.tell();
+      this.broken = false;
     } catch (error) {
+      this.broken = true;
       const sentence = `Frame ${frame.sequence} is broken: ${(error as Error).message}.`;
       post({ kind: "link", link: { state: "live", sentence } });
     }

@@ -182,17 +182,29 @@ export class Stage {
   private drawPicture(): void {
     if (!this.luma || !isPicture(this.view)) return;
     const { values, width, height } = this.luma;
-    const { reference } = this;
     if (this.view === "camera") this.map.drawLuma(this.luma);
-    if (this.view === "camera" || reference?.width !== width || reference.height !== height) return;
+    if (this.view === "camera" || this.referenceAt(0) === undefined) return;
     if (this.difference?.values.length !== values.length)
       this.difference = { width, height, values: new Uint8Array(values.length) };
     const grey = this.difference.values;
     for (let i = 0; i < grey.length; ++i) {
-      const level = 128 + CONTRAST * ((values[i] as number) - (reference.values[i] as number));
+      const before = this.referenceAt(i) as number;
+      const level = 128 + CONTRAST * ((values[i] as number) - before);
       grey[i] = Math.min(Math.max(level, 0), 255);
     }
     this.map.drawLuma(this.difference);
+  }
+
+  /** The reference at pixel `at` of the picture. A recording's pictures are whole, and its reference is of the
+   * size that the daemon decoded them at. */
+  private referenceAt(at: number): number | undefined {
+    const { luma, reference } = this;
+    if (!luma || !reference) return undefined;
+    const scale = luma.width / reference.width;
+    if (![1, 2, 4].includes(scale) || reference.height * scale !== luma.height) return undefined;
+    const column = Math.floor((at % luma.width) / scale);
+    const row = Math.floor(Math.floor(at / luma.width) / scale);
+    return reference.values[row * reference.width + column];
   }
 
   /** A sentence over the picture, empty for none, and a button below it. */
@@ -408,7 +420,7 @@ export class Stage {
     } else {
       const at = pixel.row * map.width + pixel.column;
       const grey = map.values[at] as number;
-      const before = this.view === "difference" ? this.reference?.values[at] : undefined;
+      const before = this.view === "difference" ? this.referenceAt(at) : undefined;
       const change = before === undefined ? "" : ` · reference ${before}`;
       say(this.readout, `grey ${grey} of 255${change} · ${where}${line}`);
     }
