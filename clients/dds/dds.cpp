@@ -23,6 +23,7 @@
 #include "clients/dds/recorder.hpp"
 #include "clients/dds/ros2.h"
 #include "clients/dds/sensor.hpp"
+#include "proto/defaults.hpp"
 
 namespace dtact::dds {
 namespace {
@@ -67,8 +68,10 @@ class Program {
         cli::parse_daemons("--daemon", arguments.daemons, context.target);
     if (daemons.empty() && !arguments.find) daemons = {{"sensor", context.target}};
     std::map<std::string, client::Options> perceives;
+    client::Options perceive_at = context.target;
+    perceive_at.port = wire::kPerceivePort;
     for (auto& [name, options] :
-         cli::parse_daemons("--perceive", arguments.perceives, context.target)) {
+         cli::parse_daemons("--perceive", arguments.perceives, perceive_at)) {
       perceives[name] = std::move(options);
     }
     settings_ = arguments.settings;
@@ -237,7 +240,7 @@ void set_up(CLI::App& app, cli::Context& context) {
   CLI::Option* const find = cli::add_find_option(app, arguments->find);
   app.add_option("--perceive", arguments->perceives,
                  "The dtact-perceive of a sensor, which then has object_pose and recognition; "
-                 "options as of --daemon")
+                 "options as of --daemon; port 7378 unless named")
       ->type_name("NAME=ADDRESS")
       ->take_all();
   app.add_option("--domain", arguments->graph.domain, "DDS domain")

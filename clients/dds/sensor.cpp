@@ -114,6 +114,7 @@ void Sensor::connect(Upstream& upstream, const client::Options& options, const s
       const std::lock_guard lock(mutex_);
       mapping_.reset();
       pings_.clear();
+      asked_steady_ = diagnosed_steady_ = 0;
       diagnosis_.hardware = hello.serial().empty() ? hello.name() : hello.serial();
     }
     {
@@ -137,13 +138,17 @@ void Sensor::connect(Upstream& upstream, const client::Options& options, const s
     if (is_daemon) fail_waiting(reason);
     log_(fmt::format("{} is away: {}", called, reason));
   };
-  handlers.message = [this, is_daemon](const std::string& bytes) {
+  handlers.message = [this, called, is_daemon](const std::string& bytes) {
     v1::ServerMessage message;
     if (!message.ParseFromString(bytes)) {
       throw std::runtime_error(name_ + " sends what is no message of the wire");
     }
     if (message.has_reply()) {
-      if (is_daemon) on_reply(message.reply());
+      if (is_daemon) {
+        on_reply(message.reply());
+      } else if (message.reply().has_error()) {
+        log_(fmt::format("{}: {}", called, message.reply().error().message()));
+      }
     } else if (message.has_frame()) {
       is_daemon ? on_frame(message.frame()) : on_object(message.frame());
     }
@@ -208,7 +213,13 @@ void Sensor::each_second(bool diagnostics) {
     if (!daemon_.up) return;
   }
   ping();
-  if (diagnostics || wanted(kTemperature)) {
+  const bool asks = diagnostics || wanted(kTemperature);
+  {
+    const std::lock_guard lock(mutex_);
+    if (!asks) asked_steady_ = 0;
+    if (asks && asked_steady_ == 0) asked_steady_ = steady_now();
+  }
+  if (asks) {
     v1::ClientMessage message;
     message.set_id(kStatusId);
     message.mutable_get_status();
@@ -311,7 +322,15 @@ Diagnosis Sensor::diagnosis() const {
   const std::lock_guard lock(mutex_);
   Diagnosis made = diagnosis_;
   made.name = name_ + ": dtactd";
-  if (reason.empty() && steady_now() - diagnosed_steady_ > kStaleNs) reason = "no status yet";
+  if (reason.empty() && steady_now() - diagnosed_steady_ > kStaleNs) {
+    if (asked_steady_ != 0 && steady_now() - asked_steady_ > kStaleNs) {
+      reason = "no status yet";
+    } else {  // nobody wanted to know until now
+      made.level = Diagnosis::Level::warning;
+      made.message = "its status is being asked for";
+      made.values.clear();
+    }
+  }
   if (!reason.empty()) {
     made.level = Diagnosis::Level::error;
     made.message = reason;

@@ -119,6 +119,7 @@ class Sensor {
   std::uint64_t next_id_;
   Diagnosis diagnosis_;
   std::int64_t diagnosed_steady_ = 0;  ///< CLOCK_MONOTONIC of the last status; 0: none.
+  std::int64_t asked_steady_ = 0;  ///< CLOCK_MONOTONIC since when it is asked for; 0: it is not.
 
   net::TokenBucket budget_{20, 20};  ///< Commands a second.
   PointWriter points_;               ///< Of the daemon's thread, like the next.
