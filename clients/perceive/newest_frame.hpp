@@ -12,7 +12,8 @@ class NewestFrame {
  public:
   struct Taken {
     v1::Frame frame;
-    std::uint64_t missed = 0;  ///< Frames replaced since the one taken before.
+    /// Frames since the one taken before that were replaced, or that the daemon dropped.
+    std::uint64_t missed = 0;
     /// The contact may differ from that of the frame taken before: one of the missed frames had no
     /// contact, or the connection was lost in between.
     bool parted = false;
@@ -25,6 +26,7 @@ class NewestFrame {
 
  private:
   std::optional<Taken> newest_;
+  std::uint64_t dropped_ = 0;  ///< Frame.dropped of the newest one: counted for each connection.
   bool parted_ = false;
 };
 

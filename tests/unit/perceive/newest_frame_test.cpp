@@ -48,6 +48,22 @@ TEST(NewestFrame, OfAnotherConnectionItIsAnotherContact) {
   EXPECT_TRUE(newest.take()->parted);
 }
 
+// The link was too slow for them; a new connection counts anew.
+TEST(NewestFrame, CountsWhatTheDaemonDropped) {
+  NewestFrame newest;
+  newest.put(frame_of(1, true));
+  EXPECT_EQ(newest.take()->missed, 0U);
+  v1::Frame late = frame_of(5, true);
+  late.set_dropped(3);
+  newest.put(late);
+  EXPECT_EQ(newest.take()->missed, 3U);
+  newest.part();
+  v1::Frame anew = frame_of(1, true);
+  anew.set_dropped(1);
+  newest.put(anew);
+  EXPECT_EQ(newest.take()->missed, 1U);
+}
+
 // A frame without a contact measurement, as while the light settles, is not a release.
 TEST(NewestFrame, WhatWasNotMeasuredIsNoRelease) {
   NewestFrame newest;
