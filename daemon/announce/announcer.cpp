@@ -129,6 +129,8 @@ void Announcer::Impl::tick() {
     } else if (!group.empty() && ask() != published) {
       withdraw();
       publish();
+    } else if (group.empty() && !asking) {
+      look_for_avahi();  // it is not there yet, or an error took the service back
     }
   } catch (const std::exception& e) {
     set_state(std::string("the service is not announced: ") + e.what());
