@@ -44,11 +44,17 @@ std::vector<std::uint8_t> mask_of(tomlfile::KeyReader& reader, std::size_t pixel
   const std::vector<std::int64_t> runs = reader.integers("runs", 0, limit);
   if (runs.size() % 2 != 0) reader.fail("runs", "expected pairs of first pixel and count");
   std::vector<std::uint8_t> mask(pixels);
+  std::int64_t end = 0;  // of the run before: each pixel is set once, however many runs there are
   for (std::size_t i = 0; i < runs.size(); i += 2) {
+    if (runs[i] < end) {
+      reader.fail("runs",
+                  fmt::format("pair {} begins before the end of the one before", i / 2 + 1));
+    }
     if (runs[i + 1] > limit - runs[i]) {
       reader.fail("runs", fmt::format("pair {} leaves the map of {} pixels", i / 2 + 1, pixels));
     }
     std::fill_n(mask.begin() + runs[i], runs[i + 1], std::uint8_t{1});
+    end = runs[i] + runs[i + 1];
   }
   return mask;
 }
@@ -193,10 +199,11 @@ Calibration parse(const std::string& toml, const std::string& reference_png,
   const int frame_height = small(frame, "height", 2, kMaxPixels);
   frame.finish();
   if (camera && !camera->gives(frame_width, frame_height)) {
-    top.fail("frame", fmt::format("is for frames of {}x{} pixels, the camera delivers {}x{}: set "
-                                  "camera.width and camera.height to the calibration's, or "
-                                  "calibrate in this mode",
-                                  frame_width, frame_height, camera->width, camera->height));
+    top.fail("frame",
+             fmt::format("is for frames of {}x{} pixels, the camera delivers {}: set camera.width, "
+                         "camera.height and camera.decode_scale to the calibration's, or calibrate "
+                         "in this mode",
+                         frame_width, frame_height, camera->text()));
   }
   check_area(frame, frame_width, frame_height, kMaxFramePixels);
   tomlfile::KeyReader crop = top.table("crop");
