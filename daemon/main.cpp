@@ -30,8 +30,8 @@ int main(int argc, char** argv) {
     if (options.print_config) print_config(loaded, std::cout);
     if (options.check_config) {
       check_net_files(loaded.config.net);
-      check_calibration(loaded.config);
-      check_camera(loaded.config.hal.camera);
+      if (!has_uploaded_calibration(loaded.config)) check_calibration(loaded.config);
+      check_devices(loaded.config.hal);
     }
     if (options.print_config || options.check_config) return 0;
     if (options.report) {

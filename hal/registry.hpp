@@ -24,8 +24,9 @@ struct Devices {
 /// Throws std::runtime_error naming the backend, what failed and the fix.
 [[nodiscard]] Devices open_devices(const Config& config);
 
-/// Checks what can be checked without a device: a scene is read, a recording is read and its first
-/// frame decoded. Throws as open_devices().
-void check_camera(const CameraConfig& config);
+/// Checks what can be checked without a device, so that what passes can be opened where it is
+/// attached: a scene is read, a recording is read and its first frame decoded, settings of real
+/// devices fit each other. Throws as open_devices().
+void check_devices(const Config& config);
 
 }  // namespace dtact::hal

@@ -180,6 +180,14 @@ LoadedConfig load_config(const std::optional<fs::path>& file,
         "none)",
         power.line, power.name));
   }
+  const int capture = loaded.config.pipeline.fifo_priority;
+  const int network = loaded.config.net.fifo_priority;
+  if (capture > 0 && network >= capture) {
+    throw std::runtime_error(fmt::format(
+        "net.fifo_priority = {} must be less than capture.fifo_priority = {}: clients would "
+        "delay frames",
+        network, capture));
+  }
   net::check_security(loaded.config.net);
   loaded.origins = std::move(assembly).origins();
   loaded.config.cpu_is_default =

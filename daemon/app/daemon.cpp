@@ -52,9 +52,7 @@ namespace fs = std::filesystem;
 namespace asio = boost::asio;
 
 fs::path make_state_folder(const Config& config) {
-  fs::path folder = config.state_dir;
-  if (folder.empty()) folder = state_directory();
-  if (folder.empty()) folder = "/var/lib/dtactd";
+  fs::path folder = state_folder(config);
   std::error_code error;
   fs::create_directories(folder, error);
   if (error) {
@@ -191,8 +189,16 @@ std::optional<announce::Announcer> announce_service(asio::io_context& io, const 
 /// Returns what `systemctl status` is to say of it.
 std::string reload(Config& running, const std::function<Config()>& load, net::Server& server) {
   try {
-    Reload fresh = merge(running, load());
-    server.reload(make_net_config(fresh.config));
+    const Config wanted = load();
+    Reload fresh = merge(running, wanted);
+    // What is to be switched off stays until the restart, but its files may be gone already.
+    Config files = fresh.config;
+    if (wanted.net.tls_certificate.empty()) {
+      files.net.tls_certificate.clear();
+      files.net.tls_key.clear();
+    }
+    if (wanted.net.token_file.empty()) files.net.token_file.clear();
+    server.reload(make_net_config(files));
     running = std::move(fresh.config);
     spdlog::set_level(spdlog::level::from_str(running.log_level));
     spdlog::info("{}", what_was_read(fresh));

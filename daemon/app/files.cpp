@@ -16,6 +16,7 @@
 
 #include "daemon/app/config.hpp"
 #include "daemon/app/service.hpp"
+#include "daemon/net/calibration_store.hpp"
 #include "daemon/serve/admission.hpp"
 #include "daemon/serve/security.hpp"
 #include "daemon/serve/tls.hpp"
@@ -60,9 +61,9 @@ void check_camera_files(const hal::CameraConfig& camera) {
   if (camera.backend == "replay") check_readable("camera.replay.folder", camera.replay.folder);
 }
 
-void check_camera(const hal::CameraConfig& camera) {
-  check_camera_files(camera);
-  hal::check_camera(camera);
+void check_devices(const hal::Config& config) {
+  check_camera_files(config.camera);
+  hal::check_devices(config);
 }
 
 std::filesystem::path calibration_folder(const Config& config) {
@@ -77,6 +78,17 @@ std::filesystem::path calibration_folder(const Config& config) {
 void check_calibration(const Config& config) {
   const char* const key = config.calibration.empty() ? "camera.sim.calibration" : "calibration";
   check_readable(key, calibration_folder(config));
+}
+
+std::filesystem::path state_folder(const Config& config) {
+  if (!config.state_dir.empty()) return config.state_dir;
+  const std::string of_the_unit = state_directory();
+  return of_the_unit.empty() ? "/var/lib/dtactd" : of_the_unit;
+}
+
+bool has_uploaded_calibration(const Config& config) {
+  const net::FolderCalibrationStore store(state_folder(config), calibration_folder(config));
+  return store.current() != calibration_folder(config);
 }
 
 base::UniqueFd own_state_folder(const std::filesystem::path& folder, const std::string& name) {

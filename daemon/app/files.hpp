@@ -15,14 +15,18 @@ void check_readable(const std::string& key, const std::filesystem::path& path);
 
 /// The same of what the camera that is configured reads: a scene, a recording.
 void check_camera_files(const hal::CameraConfig& camera);
-/// The same, and reads the scene, or the recording and its first frame. Throws with the fix.
-void check_camera(const hal::CameraConfig& camera);
+/// The same and hal::check_devices().
+void check_devices(const hal::Config& config);
 
 /// The folder of the calibration to run with as long as none that was uploaded is current: the
 /// configured one, or the simulated sensor's; empty = none.
 [[nodiscard]] std::filesystem::path calibration_folder(const Config& config);
 /// check_readable() of that folder, by the key that names it.
 void check_calibration(const Config& config);
+/// The folder for what outlives a restart.
+[[nodiscard]] std::filesystem::path state_folder(const Config& config);
+/// A calibration that was uploaded is current: a start takes it instead.
+[[nodiscard]] bool has_uploaded_calibration(const Config& config);
 
 /// Makes this process, the sensor `name`'s, the owner of the state folder as long as the descriptor
 /// lives. Throws std::runtime_error, naming the present owner and the fix, where it has one.

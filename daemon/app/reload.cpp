@@ -44,7 +44,10 @@ Reload merge(const Config& running, const Config& fresh) {
   for (std::size_t i = 0; i < keys.size(); ++i) {
     const std::string before = keys[i].show();
     const std::string after = news[i].show();
-    if (before == after) continue;
+    // A default is another CPU for each daemon of the machine.
+    const bool chosen =
+        keys[i].path == "capture.cpu" && running.cpu_is_default != fresh.cpu_is_default;
+    if (before == after && !chosen) continue;
     if (!is_live(keys[i].path) || switches(before, after)) {
       reload.restart.push_back(keys[i].path);
       continue;

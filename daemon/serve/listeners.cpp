@@ -47,8 +47,9 @@ void Listeners::close() {
 void Listeners::reload(const NetConfig& fresh) {
   std::unique_ptr<Tls> new_tls = make_tls(fresh);
   std::optional<Tokens> new_tokens = read_tokens(fresh);
-  // From here on nothing fails.
+  // From here on nothing fails. Neither TLS nor tokens end without a restart.
   if (tls_ && new_tls) {
+    config_.tls_certificate = fresh.tls_certificate;
     *tls_ = std::move(*new_tls);  // where it is, since the listener knows its place
     for (EndpointInfo& endpoint : endpoints_) {
       if (!endpoint.tls) continue;
@@ -56,8 +57,7 @@ void Listeners::reload(const NetConfig& fresh) {
       endpoint.certificate_expires = tls_->expires;
     }
   }
-  admission_.set_tokens(std::move(new_tokens));
-  config_.tls_certificate = fresh.tls_certificate;
+  if (new_tokens) admission_.set_tokens(std::move(new_tokens));
   certificate_watch_.check();
   config_.max_clients = fresh.max_clients;
   config_.max_clients_per_address = fresh.max_clients_per_address;

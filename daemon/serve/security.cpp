@@ -2,13 +2,22 @@
 
 #include <fmt/format.h>
 
-#include <boost/asio/ip/address.hpp>
 #include <stdexcept>
 #include <utility>
 
 #include "daemon/serve/limited_log.hpp"
 
 namespace dtact::net {
+
+boost::asio::ip::address listen_address(const NetConfig& config) {
+  boost::system::error_code error;
+  const auto address = boost::asio::ip::make_address(config.address, error);
+  if (!error) return address;
+  throw std::runtime_error(fmt::format(
+      "\"{}\" is not an IPv4 or IPv6 address to listen on: write 127.0.0.1 for this machine "
+      "only, 0.0.0.0 or :: for every interface",
+      config.address));
+}
 
 bool reaches_beyond(const NetConfig& config) {
   boost::system::error_code error;
@@ -21,6 +30,7 @@ bool is_insecure(const NetConfig& config) {
 }
 
 void check_security(const NetConfig& config) {
+  if (!config.address.empty()) (void)listen_address(config);
   if (config.tls_certificate.empty() != config.tls_key.empty()) {
     throw std::runtime_error(fmt::format(
         "net.tls_certificate = \"{}\" and net.tls_key = \"{}\": set both or none; dtactctl cert "

@@ -18,17 +18,7 @@ namespace asio = boost::asio;
 using boost::system::error_code;
 using tcp = asio::ip::tcp;
 
-tcp::endpoint endpoint_of(const NetConfig& config) {
-  error_code error;
-  const auto address = asio::ip::make_address(config.address, error);
-  if (error) {
-    throw std::runtime_error(fmt::format(
-        "\"{}\" is not an IPv4 or IPv6 address to listen on: write 127.0.0.1 for this machine "
-        "only, 0.0.0.0 or :: for every interface",
-        config.address));
-  }
-  return {address, config.port};
-}
+tcp::endpoint endpoint_of(const NetConfig& config) { return {listen_address(config), config.port}; }
 
 const char* fix_for(const error_code& error) {
   if (error == asio::error::address_in_use) {

@@ -27,11 +27,14 @@ RingParts parts_of(const Ws2812Config& config, RingInfo info,
 
 }  // namespace
 
+void check_spi(const Ws2812Config& config) {
+  const std::string refused = why_refused({config.spi_bits, static_cast<double>(config.spi_hz)});
+  if (!refused.empty()) throw std::runtime_error(fmt::format("ring.ws2812.spi_hz: {}", refused));
+}
+
 std::unique_ptr<LightRing> open_spi_ring(const Ws2812Config& config) {
+  check_spi(config);
   const SpiFormat format{config.spi_bits, static_cast<double>(config.spi_hz)};
-  if (const std::string refused = why_refused(format); !refused.empty()) {
-    throw std::runtime_error(fmt::format("ring.ws2812.spi_hz: {}", refused));
-  }
   const auto open = [config, format]() -> std::unique_ptr<Wire> {
     return std::make_unique<SpiWire>(
         std::make_unique<Spidev>(config.spi_device, static_cast<std::uint32_t>(config.spi_hz)),

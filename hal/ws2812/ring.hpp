@@ -63,6 +63,8 @@ class Ring final : public LightRing {
 
 /// The rings that the registry offers. A device that is not there is looked for; what throws is a
 /// configuration that can never work: std::runtime_error or std::invalid_argument naming the key.
+/// Throws std::runtime_error with the fix where the LEDs cannot read bits of this rate and number.
+void check_spi(const Ws2812Config& config);
 [[nodiscard]] std::unique_ptr<LightRing> open_spi_ring(const Ws2812Config& config);
 [[nodiscard]] std::unique_ptr<LightRing> open_pio_ring(const Ws2812Config& config);
 

@@ -132,6 +132,19 @@ TEST_F(Reload, AMistakeLeavesEverythingAsItWas) {
   EXPECT_THROW((void)connect(old_, kOldToken), client::EndedByDaemon);  // max_clients = 1
 }
 
+// TLS ends with a restart only, so its files may be gone before.
+TEST_F(Reload, TakesTheRestWhereTlsIsToBeSwitchedOff) {
+  fs::remove_all(file("old"));
+  write("tokens", "view " + wire::token_hash(kNewToken) + "\n");
+  std::string plain = configuration("old", "");
+  plain.erase(plain.find("tls_certificate"));
+  write("dtactd.toml", plain);
+  EXPECT_THAT(reload(),
+              HasSubstr("; needs a restart: net.tls_certificate, net.tls_key; listening"));
+  EXPECT_THROW((void)connect(old_, kOldToken), client::Refused);
+  EXPECT_EQ(connect(old_, kNewToken)->server().rights(), v1::RIGHTS_VIEW);
+}
+
 TEST_F(Reload, NamesWhatNeedsARestart) {
   write("dtactd.toml", configuration("old", "name = 'left'\n[contact]\ndebounce_frames = 3\n"));
   EXPECT_THAT(reload(),

@@ -114,6 +114,16 @@ Findings check_camera(const Machine& machine, const hal::CameraConfig& camera) {
   if (!captures && findings.empty()) {
     findings.push_back({bad, "no video node captures", "v4l2-ctl --list-devices"});
   }
+  // Another camera does not make up for the one that is meant.
+  if (const std::string& device = camera.v4l2.device;
+      camera.backend == "v4l2" && device.starts_with("/dev/")) {
+    if (const int error = machine.access(device); error != 0) {
+      findings.push_back(
+          {bad, fmt::format("camera.v4l2.device = \"{}\": {}", device, std::strerror(error)),
+           error == ENOENT ? "plug it in, or take a name that dtactctl cameras shows"
+                           : join_group(machine, device, "video")});
+    }
+  }
   // A Raspberry Pi 4 has these nodes for its image processor without any camera (bcm2835-isp).
   if (captures && !usb && camera.backend == "v4l2" && camera.v4l2.device.empty()) {
     findings.push_back({Verdict::note, "none of them is a USB camera",

@@ -151,6 +151,14 @@ TEST_F(ConfigFile, SettingsThatExcludeEachOtherAreBothNamed) {
       AllOf(HasSubstr("contact.release_mm = 0.05"), HasSubstr("contact.threshold_mm = 0.04")));
 }
 
+TEST_F(ConfigFile, WhatAStartRefusesIsRefused) {
+  EXPECT_THAT(error("[net]\naddress = 'localhost'\n"),
+              AllOf(HasSubstr("\"localhost\""), HasSubstr("write 127.0.0.1")));
+  EXPECT_THAT(error("[net]\nfifo_priority = 45\n"),
+              AllOf(HasSubstr("net.fifo_priority = 45"), HasSubstr("capture.fifo_priority = 40")));
+  EXPECT_EQ(load("[capture]\nfifo_priority = 0\n").pipeline.fifo_priority, 0);
+}
+
 TEST_F(ConfigFile, FramesAreDecodedAtASizeOfWholePixels) {
   EXPECT_THAT(error("[camera]\nwidth = 642\ndecode_scale = 4\n"),
               AllOf(HasSubstr("camera.decode_scale = 4"), HasSubstr("642x600")));

@@ -67,12 +67,49 @@ TEST(InputFiles, ARecordingsFirstFrameIsDecoded) {
   camera.backend = "replay";
   camera.replay.folder = folder;
   EXPECT_EQ(error([&] { check_camera_files(camera); }), "no error");
-  EXPECT_THAT(error([&] { app::check_camera(camera); }),
+  EXPECT_THAT(error([&] { app::check_devices({.camera = camera}); }),
               StartsWith((folder / "1.jpg").string() + ": "));
   std::filesystem::remove_all(folder);
   camera.backend = "sim";
   camera.sim.scene = folder;
-  EXPECT_THAT(error([&] { app::check_camera(camera); }), StartsWith("camera.sim.scene = "));
+  EXPECT_THAT(error([&] { app::check_devices({.camera = camera}); }),
+              StartsWith("camera.sim.scene = "));
+}
+
+// Settings that no device could be opened with, though the file is well-formed.
+TEST(InputFiles, SettingsOfDevicesFitEachOther) {
+  const auto said = [](const hal::Config& config) {
+    return error([&] { app::check_devices(config); });
+  };
+  hal::Config config;
+  config.camera.backend = "v4l2";
+  config.ring.backend = "ws2812_spi";
+  EXPECT_EQ(said(config), "no error");
+  hal::Config both = config;
+  both.camera.v4l2.exposure_us = 5000;
+  both.camera.v4l2.exposure_pwm_periods = 2;
+  EXPECT_THAT(said(both), HasSubstr("not both"));
+  hal::Config node = config;
+  node.camera.v4l2.device = "video0";
+  EXPECT_THAT(said(node), StartsWith("camera.v4l2.device = \"video0\""));
+  hal::Config spi = config;
+  spi.ring.ws2812.spi_bits = 8;
+  EXPECT_THAT(said(spi), StartsWith("ring.ws2812.spi_hz: "));
+  config.camera.backend = "libcamera";
+  config.camera.libcamera.exposure_pwm_periods = 2;
+  EXPECT_THAT(said(config), HasSubstr("camera.libcamera.pwm_hz"));
+}
+
+TEST(InputFiles, AnUploadedCalibrationIsUsedInsteadOfTheConfiguredOne) {
+  const std::filesystem::path folder = fakes::own_path();
+  std::filesystem::create_directories(folder);
+  Config config;
+  config.state_dir = folder;
+  config.calibration = "/no/such/own";
+  EXPECT_FALSE(has_uploaded_calibration(config));
+  std::filesystem::create_directory_symlink("calibrations/1/lid", folder / "calibration");
+  EXPECT_TRUE(has_uploaded_calibration(config));
+  std::filesystem::remove_all(folder);
 }
 
 // A real camera must never show depth by the simulated sensor's calibration.

@@ -44,6 +44,15 @@ TEST(Reload, TokensAndTlsChangeFromFileToFileOnly) {
   EXPECT_EQ(merge(fresh, other).config.net.token_file, "credential:tokens");
 }
 
+// The default is another CPU for each daemon of a machine, so its number may be the chosen one's.
+TEST(Reload, AChosenCpuIsNotTheDefault) {
+  Config running;
+  running.cpu_is_default = true;
+  Config fresh = running;
+  fresh.cpu_is_default = false;
+  EXPECT_THAT(merge(running, fresh).restart, ElementsAre("capture.cpu"));
+}
+
 // systemd fills $CREDENTIALS_DIRECTORY at a start and, except for version 252, not at a reload: a
 // token that was revoked since may still count.
 TEST(Reload, SaysThatNewCredentialsNeedARestart) {

@@ -40,6 +40,18 @@ TEST(DoctorCamera, NamesTheNodeThatCapturesAndPassesOverMetadata) {
   EXPECT_TRUE(all_good(findings));
 }
 
+TEST(DoctorCamera, AnotherCameraIsNotTheConfiguredOne) {
+  FakeMachine machine;
+  machine.file("/dev/video0");
+  machine.videos = {{"/dev/video0", {true, "Webcam", 0}}};
+  hal::CameraConfig camera = v4l2();
+  camera.v4l2.device = "/dev/v4l/by-path/none";
+  const Finding finding = only_trouble(check_camera(machine, camera));
+  EXPECT_EQ(finding.verdict, Verdict::wrong);
+  EXPECT_THAT(finding.what, HasSubstr("camera.v4l2.device = \"/dev/v4l/by-path/none\""));
+  EXPECT_THAT(finding.fix, HasSubstr("dtactctl cameras"));
+}
+
 TEST(DoctorCamera, OnlyMetadataIsNoCamera) {
   FakeMachine machine;
   machine.file("/dev/video1");

@@ -33,6 +33,7 @@ for unit in dtactd.service dtactd@.service dtact-dds.service dtact-perceive.serv
   done
 done
 for unit in dtactd.service dtactd@.service; do
+  grep -qx 'LimitNOFILE=4096' "$source/$unit" || fail "$unit has no room for net.max_clients = 1024"
   # The drivers that are modules, by the kind of device that systemd has to know.
   for driver in video4linux:videodev spi:spidev ws2812-pio-rp1:ws2812_pio_rp1; do
     for line in "DeviceAllow=char-${driver%:*} rw" "Wants=.*modprobe@${driver#*:}\.service.*" \
