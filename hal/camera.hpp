@@ -43,6 +43,7 @@ struct CameraSettings {
 struct CameraChange {
   std::optional<double> exposure_us;  ///< Microseconds.
   std::optional<double> gain;         ///< In the camera's own unit.
+  [[nodiscard]] bool operator==(const CameraChange&) const = default;
 };
 
 /// Who the camera is and how it runs. Size and rate are fixed from construction on; the other

@@ -1,5 +1,6 @@
 #include "daemon/calibration/calibration.hpp"
 
+#include <fmt/format.h>
 #include <openssl/evp.h>
 
 #include <algorithm>
@@ -44,6 +45,12 @@ recon::RectifyTable map_table(const std::optional<recon::Lens>& lens, int frame_
   outside.clear();
   return recon::make_crop_table(frame_width, frame_height, place.col, place.row, place.width,
                                 place.height);
+}
+
+std::string FrameSize::text() const {
+  std::string size = fmt::format("{}x{}", width, height);
+  if (decode_scale == 1) return size;
+  return size + fmt::format(" (decoded from {}x{})", width * decode_scale, height * decode_scale);
 }
 
 std::shared_ptr<const Calibration> for_scaled_frames(std::shared_ptr<const Calibration> calibration,

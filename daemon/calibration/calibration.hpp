@@ -114,6 +114,8 @@ struct FrameSize {
     return (frame_width == width && frame_height == height) ||
            (frame_width == width * decode_scale && frame_height == height * decode_scale);
   }
+  /// "400x300 (decoded from 800x600)".
+  [[nodiscard]] std::string text() const;
 };
 
 /// Reads and checks a calibration folder, as parse(). Throws std::runtime_error with file, line,

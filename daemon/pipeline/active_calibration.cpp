@@ -29,9 +29,11 @@ std::shared_ptr<const calibration::Calibration> for_frames(
   if (table.frame_width == camera.width && table.frame_height == camera.height) return calibration;
   if (!fits(*calibration, camera)) {
     throw std::invalid_argument(fmt::format(
-        "calibration \"{}\" is for frames of {}x{} pixels, the camera delivers {}x{}: set "
-        "camera.width and camera.height to the calibration's, or calibrate in this mode",
-        calibration->name, table.frame_width, table.frame_height, camera.width, camera.height));
+        "calibration \"{}\" is for frames of {}x{} pixels, the camera delivers {}: set "
+        "camera.width, camera.height and camera.decode_scale to the calibration's, or calibrate in "
+        "this mode",
+        calibration->name, table.frame_width, table.frame_height,
+        calibration::FrameSize{camera.width, camera.height, camera.decode_scale}.text()));
   }
   return calibration::for_scaled_frames(calibration, camera.decode_scale);
 }

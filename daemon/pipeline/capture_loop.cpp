@@ -32,7 +32,7 @@ CaptureLoop::CaptureLoop(const CaptureParts& parts, const PipelineConfig& config
           std::chrono::nanoseconds(hal::stall_ns(period_ns_)), kLongestGrab)),
       timeline_(config.light, config.light_delay_frames.value_or(camera_.info().light_delay_frames),
                 period_ns_),
-      tracker_(camera_.info().width, camera_.info().height, timeline_, config),
+      tracker_(camera_.info().width, camera_.info().height, timeline_, config, decode_scale_),
       depth_(config, clock_),
       watch_(period_ns_),
       reporter_(exchange_),

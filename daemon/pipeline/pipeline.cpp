@@ -13,8 +13,9 @@ hal::CameraInfo checked(const hal::CameraInfo& info) {
   if (info.width < kMinFrameWidth || info.height < kMinFrameHeight) {
     throw std::invalid_argument(
         fmt::format("camera {} delivers {}x{} pixels; at least {}x{} are needed: choose another "
-                    "camera.width and camera.height",
-                    info.identity, info.width, info.height, kMinFrameWidth, kMinFrameHeight));
+                    "camera.width and camera.height{}",
+                    info.identity, info.width, info.height, kMinFrameWidth, kMinFrameHeight,
+                    info.decode_scale == 1 ? "" : ", or a smaller camera.decode_scale"));
   }
   if (!(info.fps > 0)) {
     throw std::invalid_argument(

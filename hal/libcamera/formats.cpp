@@ -98,6 +98,9 @@ Choice choose_format(lc::CameraConfiguration& configuration, const CameraConfig&
   const std::string& key = asked.libcamera.pixel_format;
   for (const Known& known : known_formats()) {
     if ((key != "auto" && key != known.key) || !suits(known, sensor)) continue;
+    if (key == "auto" && asked.decode_scale != 1 && known.choice.encoding != live::Encoding::jpeg) {
+      continue;
+    }
     // A Pi gives Rec. 709 in limited range for video (pipeline_base.cpp: generateConfiguration()),
     // 14 % fewer grey levels than sYCC.
     if (ranged) stream.colorSpace = lc::ColorSpace::Sycc;
@@ -114,7 +117,11 @@ Choice choose_format(lc::CameraConfiguration& configuration, const CameraConfig&
   throw live::ModeError(
       fmt::format("{} has no mode {}x{}{}: set camera.width, camera.height and "
                   "camera.libcamera.pixel_format to one of: {}",
-                  identity, asked.width, asked.height, key == "auto" ? "" : " in " + key, offer));
+                  identity, asked.width, asked.height,
+                  key != "auto"             ? " in " + key
+                  : asked.decode_scale != 1 ? " in mjpeg, which camera.decode_scale needs"
+                                            : "",
+                  offer));
 }
 
 live::Format format_of(const lc::StreamConfiguration& stream, const Choice& choice) {

@@ -139,7 +139,13 @@ void LiveCamera::connect() {
   driver_was_full_ = false;
   after_gap_ = get(counters_.delivered) > 0;
   reopened_ = after_gap_;
-  const std::lock_guard guard(mutex_);
+  std::unique_lock guard(mutex_);
+  while (changed_ != changed) {  // meanwhile
+    changed = changed_;
+    guard.unlock();
+    base::run_unpinned(cpus_, [&] { change_again(changed, opened); });
+    guard.lock();
+  }
   info_.identity = std::move(opened.identity);
   info_.pixel_format = std::move(opened.pixel_format);
   info_.controls = std::move(opened.controls);
@@ -393,20 +399,24 @@ void LiveCamera::note_silence(std::int64_t now) noexcept {
 void LiveCamera::change(const CameraChange& change) {
   const std::lock_guard controls_guard(controls_mutex_);
   std::unique_lock guard(mutex_);
-  std::shared_ptr<Connection> held = connection_;
-  if (!held) throw DeviceError(state_.load(), fix_);
-  std::vector<CameraControl> controls = info_.controls;
-  CameraSettings settings = info_.settings;
-  guard.unlock();
-  held->source->change(change, controls, settings);
-  const Connection* changed = held.get();
-  held.reset();  // may close the device: not under the mutex
-  guard.lock();
-  if (change.exposure_us) changed_.exposure_us = change.exposure_us;
-  if (change.gain) changed_.gain = change.gain;
-  if (changed != connection_.get()) return;
-  info_.controls = std::move(controls);
-  info_.settings = settings;
+  if (!connection_) throw DeviceError(state_.load(), fix_);
+  // Again where the camera has been opened anew meanwhile, without the change. While it is away,
+  // the next connection gets it.
+  while (std::shared_ptr<Connection> held = connection_) {
+    std::vector<CameraControl> controls = info_.controls;
+    CameraSettings settings = info_.settings;
+    guard.unlock();
+    held->source->change(change, controls, settings);
+    const Connection* changed = held.get();
+    held.reset();  // may close the device: not under the mutex
+    guard.lock();
+    if (change.exposure_us) changed_.exposure_us = change.exposure_us;
+    if (change.gain) changed_.gain = change.gain;
+    if (changed != connection_.get()) continue;
+    info_.controls = std::move(controls);
+    info_.settings = settings;
+    return;
+  }
 }
 
 void LiveCamera::watch_controls() noexcept {

@@ -124,6 +124,8 @@ std::uint32_t choose(const std::vector<Mode>& modes, const CameraConfig& asked,
   const std::string& key = asked.v4l2.pixel_format;
   for (const PixelFormat& format : supported_formats()) {
     if (key != "auto" && key != format.key) continue;
+    if (key == "auto" && asked.decode_scale != 1 && format.encoding != live::Encoding::jpeg)
+      continue;
     for (const Mode& mode : modes) {
       if (find_format(mode.fourcc) == &format &&
           mode.offers(asked.width, asked.height, asked.fps)) {
@@ -134,7 +136,10 @@ std::uint32_t choose(const std::vector<Mode>& modes, const CameraConfig& asked,
   throw ModeError(
       fmt::format("{} has no mode {}x{} at {:g} frames a second{}: set camera.width, "
                   "camera.height, camera.fps and camera.v4l2.pixel_format to one of: {}",
-                  name, asked.width, asked.height, asked.fps, key == "auto" ? "" : " in " + key,
+                  name, asked.width, asked.height, asked.fps,
+                  key != "auto"             ? " in " + key
+                  : asked.decode_scale != 1 ? " in mjpeg, which camera.decode_scale needs"
+                                            : "",
                   alternatives(modes, asked)));
 }
 

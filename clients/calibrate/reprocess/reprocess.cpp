@@ -47,8 +47,9 @@ bool measurable(const v1::Frame& frame) {
          !has(frame, v1::HEALTH_REFERENCE_STALE);
 }
 
-/// By what the daemon had decoded the JPEGs smaller (camera.decode_scale): its reference says so.
-int decode_scale_of(const mcap::Reader& file, const calibration::Calibration& calibration) {
+/// By what the daemon's frames were smaller than those of the calibration (camera.decode_scale):
+/// its reference says so.
+int frame_scale_of(const mcap::Reader& file, const calibration::Calibration& calibration) {
   const auto place = recording::find_attachment(file, recording::kCurrentReferencePng);
   if (!place) return 1;
   const image::Grey16 reference =
@@ -63,6 +64,25 @@ int decode_scale_of(const mcap::Reader& file, const calibration::Calibration& ca
   return 1;
 }
 
+/// By what the daemon decoded the recording's JPEGs smaller, to frames of this width; 1 where there
+/// is no JPEG that says so.
+int jpeg_scale_of(const mcap::Reader& file, int frame_width) {
+  hal::mjpeg::GreyDecoder headers(1, 1);
+  hal::mjpeg::Size size;
+  bool found = false;
+  recording::RecordingHandlers handlers;
+  handlers.frame = [&](const v1::Frame& frame, std::uint64_t) {
+    found =
+        frame.has_jpeg() && headers.read_size(payload_of(frame), size) == hal::mjpeg::Status::ok;
+    return !found;
+  };
+  recording::read_recording(file, handlers);
+  for (const int scale : {2, 4}) {
+    if (found && size.width == scale * frame_width) return scale;
+  }
+  return 1;
+}
+
 /// The file until it is whole: a failure, or Ctrl-C, leaves the one before.
 fs::path part_of(const std::string& output) { return output + ".part"; }
 
@@ -73,9 +93,10 @@ class Reprocessor {
         calibration_(std::make_shared<const calibration::Calibration>(
             calibration::load(options.calibration))),
         file_(options.recording),
-        scale_(decode_scale_of(file_, *calibration_)),
-        remaker_(calibration::for_scaled_frames(calibration_, scale_)),
-        decoder_(frame_width() * scale_, frame_height() * scale_, scale_),
+        frame_scale_(frame_scale_of(file_, *calibration_)),
+        jpeg_scale_(jpeg_scale_of(file_, frame_width())),
+        remaker_(calibration::for_scaled_frames(calibration_, frame_scale_)),
+        decoder_(frame_width() * jpeg_scale_, frame_height() * jpeg_scale_, jpeg_scale_),
         luma_(frame_width(), frame_height()),
         sink_(part_of(options.output), true),
         writer_(sink_, {.program = context.target.program}) {}
@@ -124,18 +145,18 @@ class Reprocessor {
  private:
   /// Of the decoded frames.
   [[nodiscard]] int frame_width() const {
-    return calibration_->model->rectify.frame_width / scale_;
+    return calibration_->model->rectify.frame_width / frame_scale_;
   }
   [[nodiscard]] int frame_height() const {
-    return calibration_->model->rectify.frame_height / scale_;
+    return calibration_->model->rectify.frame_height / frame_scale_;
   }
 
   bool decode(const v1::Frame& frame) {
     const auto status = decoder_.decode(payload_of(frame), luma_.data(), luma_.stride());
     if (status == hal::mjpeg::Status::wrong_size) {
       throw std::runtime_error(fmt::format("{}: its images have another size than the {}x{} of {}",
-                                           options_.recording, frame_width() * scale_,
-                                           frame_height() * scale_, options_.calibration));
+                                           options_.recording, frame_width() * jpeg_scale_,
+                                           frame_height() * jpeg_scale_, options_.calibration));
     }
     return status == hal::mjpeg::Status::ok;
   }
@@ -235,7 +256,8 @@ class Reprocessor {
   const Options& options_;
   std::shared_ptr<const calibration::Calibration> calibration_;
   mcap::Reader file_;
-  int scale_;  // from JPEGs to decoded frames
+  int frame_scale_;  // from the calibration's frames to the decoded ones
+  int jpeg_scale_;   // from JPEGs to them; the same unless the calibration was made for them
   DepthReprocessor remaker_;
   hal::mjpeg::GreyDecoder decoder_;
   hal::luma::LumaBuffer luma_;

@@ -10,8 +10,11 @@
 namespace dtact::pipeline {
 
 CameraShiftDetector::CameraShiftDetector(int width, int height, int frames,
-                                         base::BackgroundThread& thread)
-    : width_(width), average_(width, height, frames), compare_(thread, [this] { judge(); }) {
+                                         base::BackgroundThread& thread, int decode_scale)
+    : width_(width),
+      decode_scale_(decode_scale),
+      average_(width, height, frames),
+      compare_(thread, [this] { judge(); }) {
   job_.image_q8.resize(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
 }
 
@@ -60,9 +63,9 @@ void CameraShiftDetector::compare() {
   const auto move = job_.then->moved_to(GelMarks(job_.image_q8, width_, job_.then->part()));
   if (move) {
     const std::scoped_lock lock(mutex_);
-    message_ =
-        fmt::format("They are about {} px {} and {} px {} of there", std::abs(move->x),
-                    move->x < 0 ? "left" : "right", std::abs(move->y), move->y < 0 ? "up" : "down");
+    message_ = fmt::format("They are about {} px {} and {} px {} of there",
+                           decode_scale_ * std::abs(move->x), move->x < 0 ? "left" : "right",
+                           decode_scale_ * std::abs(move->y), move->y < 0 ? "up" : "down");
     if (move->turn_deg != 0) {
       message_ += fmt::format(", turned by {} degrees {}", std::abs(move->turn_deg),
                               move->turn_deg < 0 ? "anticlockwise" : "clockwise");

@@ -20,8 +20,10 @@ namespace dtact::pipeline {
 /// on the side thread, which takes a tenth of a second.
 class CameraShiftDetector {
  public:
-  /// `frames`: number of frames averaged, as for a reference.
-  CameraShiftDetector(int width, int height, int frames, base::BackgroundThread& thread);
+  /// `frames`: number of frames averaged, as for a reference. `decode_scale`: of the camera's JPEGs
+  /// to the frames (hal::CameraInfo); the message counts pixels of the JPEGs.
+  CameraShiftDetector(int width, int height, int frames, base::BackgroundThread& thread,
+                      int decode_scale = 1);
 
   // On the capture thread; neither waits nor allocates.
 
@@ -49,6 +51,7 @@ class CameraShiftDetector {
   void compare();
 
   int width_;
+  int decode_scale_;
   ReferenceAverage average_;
   std::shared_ptr<const GelMarks> then_;
   std::uint64_t epoch_ = 0;  // counts calibrations

@@ -18,13 +18,13 @@ constexpr std::int64_t kKeepChangedNs = 30'000'000'000;
 }  // namespace
 
 ReferenceTracker::ReferenceTracker(int width, int height, const LightTimeline& light,
-                                   const PipelineConfig& config)
+                                   const PipelineConfig& config, int decode_scale)
     : width_(width),
       height_(height),
       timeline_(light),
       folder_(config.state_folder),
       writer_(width, height, folder_, side_),
-      camera_shift_(width, height, config.reference.frames, side_),
+      camera_shift_(width, height, config.reference.frames, side_, decode_scale),
       keeper_(width, height, config.reference),
       follower_(config.drift) {}
 

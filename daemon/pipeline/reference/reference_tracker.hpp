@@ -52,7 +52,9 @@ class ReferenceTracker {
  public:
   /// Frames of width × height pixels, lit by what `light` says, which outlives the tracker. Throws
   /// std::invalid_argument when the frames are too small or the rules impossible.
-  ReferenceTracker(int width, int height, const LightTimeline& light, const PipelineConfig& config);
+  /// `decode_scale`: see CameraShiftDetector.
+  ReferenceTracker(int width, int height, const LightTimeline& light, const PipelineConfig& config,
+                   int decode_scale = 1);
 
   // Not on the capture thread.
 

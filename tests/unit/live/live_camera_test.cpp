@@ -6,6 +6,7 @@
 #include <array>
 #include <atomic>
 #include <deque>
+#include <functional>
 #include <memory>
 #include <string>
 #include <utility>
@@ -66,6 +67,7 @@ class LeasingSource final : public Source {
   void change(const CameraChange& change, std::vector<CameraControl>& /*controls*/,
               CameraSettings& settings) override {
     settings.exposure_us->value = *change.exposure_us;
+    if (after_change) std::exchange(after_change, nullptr)();
   }
   void change_before_use(const CameraChange& change, std::vector<CameraControl>& controls,
                          CameraSettings& settings) override {
@@ -98,6 +100,7 @@ class LeasingSource final : public Source {
   std::uint32_t sequence = 0;
   int taken = 0;
   int changes_before_use = 0;
+  std::function<void()> after_change;
 };
 
 CameraConfig small() {
@@ -458,6 +461,25 @@ TEST(LiveCamera, AReopenedCameraIsChangedBeforeItsFramesAreUsed) {
   ASSERT_EQ(camera.grab(frame, milliseconds(1000)), GrabStatus::ok);
   EXPECT_EQ(camera.info().settings.exposure_us->value, 4000);
   EXPECT_EQ(source->changes_before_use, 1);
+}
+
+TEST(LiveCamera, AChangeDuringAReopeningHoldsForTheNewConnection) {
+  auto source = std::make_shared<LeasingSource>();
+  LiveCamera camera(small(), "test", "nothing yet", [&source]() -> Opened {
+    const CameraSetting exposure{8000, 100, 10000};
+    return {source, "the one", "GREY", {}, {.exposure_us = exposure, .gain = {}}};
+  });
+  camera.start();
+  Frame frame;
+  const auto first = source;
+  first->after_change = [&] {
+    first->broken = true;
+    source = std::make_shared<LeasingSource>();
+    source->fill(0, 50);
+    EXPECT_EQ(camera.grab(frame, milliseconds(1000)), GrabStatus::ok);
+  };
+  camera.change({.exposure_us = 4000, .gain = {}});
+  EXPECT_EQ(camera.info().settings.exposure_us->value, 4000);
 }
 
 TEST(LiveCamera, RefusesImpossibleRates) {

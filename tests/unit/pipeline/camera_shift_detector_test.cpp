@@ -60,6 +60,18 @@ TEST_F(CameraShiftDetectorTest, ReportsAMovedCameraAndHowFar) {
   EXPECT_FALSE(watch.moved());
 }
 
+// A person measures in the camera's own picture.
+TEST_F(CameraShiftDetectorTest, CountsPixelsOfTheJpegs) {
+  CameraShiftDetector halved{fakes::kToyWidth, fakes::kToyHeight, kFrames, thread, 2};
+  halved.use_marks(calibrated());
+  for (int i = 0; i < kFrames; ++i) {
+    const fakes::ToyFrame frame({.marks = 2, .marks_px = 4}, sequence++);
+    halved.look(frame.view(), true, now_ns += 16'666'667);
+  }
+  halved.settle();
+  EXPECT_EQ(halved.message(), "They are about 8 px right and 0 px down of there.");
+}
+
 TEST_F(CameraShiftDetectorTest, AveragesNothingFromBeforeANewReference) {
   watch.use_marks(calibrated());
   show(kFrames - 1, 4);

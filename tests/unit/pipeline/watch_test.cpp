@@ -340,8 +340,8 @@ TEST(Activate, NamesAFrameSizeThatDoesNotFit) {
     EXPECT_STREQ(
         e.what(),
         "calibration \"toy\" is for frames of 160x120 pixels, the camera delivers 320x240: "
-        "set camera.width and camera.height to the calibration's, or calibrate in this "
-        "mode");
+        "set camera.width, camera.height and camera.decode_scale to the calibration's, or "
+        "calibrate in this mode");
   }
 }
 
@@ -360,8 +360,10 @@ TEST(Activate, TakesACalibrationForTheJpegsOrForTheDecodedFrames) {
 
   const auto own = std::make_shared<const calibration::Calibration>(*active->image.calibration);
   EXPECT_EQ(activate(own, camera, {})->image.calibration, own) << "made for these frames";
-  camera.decode_scale = 1;
-  EXPECT_THROW((void)activate(toy, camera, {}), std::invalid_argument);
+  camera.decode_scale = 4;
+  EXPECT_THAT([&] { (void)activate(toy, camera, {}); },
+              testing::ThrowsMessage<std::invalid_argument>(
+                  testing::HasSubstr("the camera delivers 80x60 (decoded from 320x240)")));
 }
 
 TEST(Activate, KnowsTheCellsOfTheCalibratedPart) {

@@ -1,5 +1,6 @@
 #include "hal/v4l2/modes.hpp"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <linux/videodev2.h>
 
@@ -95,6 +96,15 @@ TEST(Modes, ChecksTheConfiguredFormat) {
 
 using live::PayloadDecoder;
 using live::PayloadStatus;
+
+TEST(Modes, OnlyMjpegIsDecodedAtASmallerSize) {
+  CameraConfig half = asked(800, 600, 30);
+  half.decode_scale = 2;
+  EXPECT_EQ(choose(kModes, half, "cam"), V4L2_PIX_FMT_MJPEG);
+  EXPECT_THAT([&] { (void)choose({mode(V4L2_PIX_FMT_YUYV, 800, 600, {30})}, half, "cam"); },
+              testing::ThrowsMessage<ModeError>(
+                  testing::HasSubstr("in mjpeg, which camera.decode_scale needs")));
+}
 
 TEST(Payload, FindsAJpegsMarkersUnderPadding) {
   live::Format format;
