@@ -76,7 +76,7 @@ void Link::run() {
         const std::lock_guard lock(mutex_);
         return options_;
       }();
-      client::Connection connection(options, {Clock::now() + options.timeout, wake_.get()});
+      client::Connection connection(options, {client::after(options.timeout), wake_.get()});
       v1::HelloReply daemon = greet(connection, options);
       {
         const std::lock_guard lock(mutex_);
@@ -114,7 +114,7 @@ void Link::drain() const noexcept {
 }
 
 v1::HelloReply Link::greet(client::Connection& connection, const client::Options& options) const {
-  const client::Limit limit{Clock::now() + options.timeout, wake_.get()};
+  const client::Limit limit{client::after(options.timeout), wake_.get()};
   v1::ClientMessage hello;
   hello.set_id(kHelloId);
   *hello.mutable_hello() = client::hello_for(options, connection);
@@ -143,7 +143,7 @@ void Link::serve(client::Connection& connection, std::chrono::milliseconds timeo
       outgoing.swap(outgoing_);
     }
     for (const std::string& message : outgoing) {
-      connection.write(message, {Clock::now() + timeout});
+      connection.write(message, {client::after(timeout)});
     }
     while (const std::string* message = connection.read({Clock::now() + kForever, wake_.get()})) {
       handlers_.message(*message);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <chrono>
 #include <cstddef>
 #include <span>
@@ -16,6 +17,16 @@ struct Limit {
   std::chrono::steady_clock::time_point end;
   int wake = -1;
 };
+
+/// The moment in `wait` from now: the clock's last one where its count does not reach that far.
+[[nodiscard]] inline std::chrono::steady_clock::time_point after(std::chrono::milliseconds wait) {
+  using Clock = std::chrono::steady_clock;
+  const auto now = Clock::now();
+  // Compared as milliseconds: milliseconds::max() is more than the clock's nanoseconds can count.
+  const auto most = std::chrono::floor<std::chrono::milliseconds>(Clock::time_point::max() - now);
+  if (wait.count() >= most.count()) return Clock::time_point::max();
+  return now + std::max(wait, std::chrono::milliseconds(0));
+}
 
 /// Waits until `fd` is ready for `events` (of poll(2)); −1 waits for the limit alone. False: the
 /// limit came first.

@@ -3,8 +3,11 @@
 #include <sys/eventfd.h>
 
 #include <algorithm>
+#include <chrono>
+#include <cmath>
 #include <utility>
 
+#include "clients/cpp/channel.hpp"
 #include "clients/cpp/session.hpp"
 #include "hal/base/unique_fd.hpp"
 
@@ -61,9 +64,11 @@ void Client::rezero(bool force) {
   v1::ClientMessage message;
   message.mutable_rezero()->set_force(force);
   // On top of the timeout: the daemon averages frames before it answers.
-  const auto within = std::chrono::duration_cast<std::chrono::milliseconds>(
-      std::chrono::duration<double>(server().rezero_timeout_s()));
-  (void)session_->request(message, session_->options().timeout + within);
+  // Both bounded, so that the sum is a number of milliseconds whatever each of them is.
+  constexpr std::chrono::milliseconds kLongest = std::chrono::years(100);
+  const auto within = std::chrono::milliseconds(
+      std::llround(std::clamp(server().rezero_timeout_s(), 0.0, 1e6) * 1e3));
+  (void)session_->request(message, std::min(session_->options().timeout, kLongest) + within);
 }
 
 v1::CameraSettings Client::set_camera(const v1::SetCamera& change) {
@@ -131,7 +136,7 @@ void Client::pin_calibration(std::uint64_t number, bool pinned) {
 }
 
 std::optional<Item> Client::next(std::chrono::milliseconds timeout) {
-  return session_->next({std::chrono::steady_clock::now() + timeout});
+  return session_->next({after(timeout)});
 }
 
 void Client::run(const Handlers& handlers, const std::stop_token& stop) {

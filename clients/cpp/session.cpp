@@ -7,6 +7,7 @@
 #include <random>
 #include <utility>
 
+#include "clients/cpp/channel.hpp"
 #include "clients/cpp/errors.hpp"
 #include "proto/framing.hpp"
 
@@ -87,7 +88,7 @@ Session::Session(const Options& options)
     : options_(options),
       backoff_(options.reconnect.value_or(Reconnect{}), std::random_device{}()),
       process_(::getpid()) {
-  open({Clock::now() + options_.timeout});
+  open({after(options_.timeout)});
 }
 
 void Session::open(const Limit& limit) {
@@ -100,7 +101,7 @@ void Session::open(const Limit& limit) {
 }
 
 void Session::reopen(int wake) {
-  const Limit limit{Clock::now() + options_.timeout, wake};
+  const Limit limit{after(options_.timeout), wake};
   const std::size_t before = inbox_.size();
   inbox_.emplace_back(Reconnected{
       loss_.reason, std::chrono::floor<std::chrono::milliseconds>(Clock::now() - loss_.since),
@@ -197,7 +198,7 @@ v1::Reply Session::request(v1::ClientMessage& message, std::chrono::milliseconds
     reopen(-1);
   }
   try {
-    return exchange(message, {Clock::now() + timeout});
+    return exchange(message, {after(timeout)});
   } catch (const TimeoutError&) {
     throw;
   } catch (const ConnectionError& e) {

@@ -98,6 +98,21 @@ TEST(Connecting, NamesWhatAnAddressAnsweredWhenTheOthersAreSilent) {
   }
 }
 
+TEST(Using, TheLongestTimeoutIsNoneInThePast) {
+  PlayedDaemon daemon({[](Peer& peer) {
+    peer.greet();
+    peer.done();
+    std::this_thread::sleep_for(milliseconds(100));
+    peer.frame(7);
+    (void)peer.ends_silently();
+  }});
+  daemon.options.timeout = milliseconds::max();
+  Client client(daemon.options);
+  client.rezero();
+  EXPECT_TRUE(client.next(milliseconds::max()).has_value());
+  EXPECT_FALSE(client.next(milliseconds::min()).has_value());
+}
+
 TEST(Using, ASecondThreadIsNamedAndTheFirstGoesOn) {
   PlayedDaemon daemon({[](Peer& peer) {
     peer.greet();
