@@ -17,8 +17,8 @@ enum ExitCode : int {
 inline constexpr const char* kExitCodesHelp =
     "Exit codes: 0 done; 1 failed, or refused by the daemon; 2 wrong usage; 3 no connection to\n"
     "the daemon; 4 what was asked for did not come about (dtactctl watch --min-fps: too few\n"
-    "frames; bench: no frame; find, fleet: no daemon; dtact-calibrate guided: ended\n"
-    "without a calibration).";
+    "frames; bench: no frame; find, fleet: no daemon; setup: a step is not done;\n"
+    "dtact-calibrate guided: ended without a calibration).";
 
 /// A failure with an exit code of its own. Any other exception ends the program with kFailed.
 class Failure : public std::runtime_error {

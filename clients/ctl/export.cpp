@@ -2,7 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <cerrno>
 #include <charconv>
+#include <cstdint>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <limits>
@@ -11,6 +14,10 @@
 #include <ostream>
 #include <regex>
 #include <stdexcept>
+#include <string>
+#include <string_view>
+#include <system_error>
+#include <utility>
 #include <vector>
 
 #include "clients/common/depth_file.hpp"
@@ -190,9 +197,9 @@ std::string line_of(const v1::Event& event, std::uint64_t time) {
 /// Writes the frames of a recording into a folder.
 class Exporter {
  public:
-  explicit Exporter(const ExportOptions& options)
+  Exporter(const ExportOptions& options, fs::path folder)
       : options_(options),
-        folder_(options.output),
+        folder_(std::move(folder)),
         range_(parse_range(options.frames).value_or(Range{})),
         frames_(folder_ / "frames.csv"),
         events_(folder_ / "events.csv") {
@@ -263,7 +270,7 @@ class Exporter {
 
 bool is_exported(const std::string& name) {
   static const std::regex kExported(
-      R"(frames\.csv|events\.csv|depth\.npy|depth-\d+\.(png|ply|pcd))");
+      R"(frames\.csv|events\.csv|depth\.npy|depth-\d{6,}\.(png|ply|pcd))");
   return std::regex_match(name, kExported);
 }
 
@@ -276,24 +283,45 @@ void remove_earlier(const fs::path& folder) {
   for (const fs::path& file : earlier) fs::remove(file);
 }
 
+/// A new folder within `folder`, where its files can be renamed from.
+fs::path make_folder_in(const fs::path& folder) {
+  std::string path = folder / ".export.XXXXXX";
+  if (::mkdtemp(path.data()) == nullptr) {
+    throw std::system_error(errno, std::generic_category(), folder.string());
+  }
+  return path;
+}
+
+/// Puts the files of a whole export in the place of an earlier one's.
+void replace_earlier(const fs::path& folder, const fs::path& fresh) {
+  std::vector<fs::path> files;
+  for (const auto& entry : fs::directory_iterator(fresh)) files.push_back(entry.path());
+  remove_earlier(folder);
+  for (const fs::path& file : files) fs::rename(file, folder / file.filename());
+}
+
 void run_export(const cli::Context& context, const ExportOptions& options) {
   const mcap::Reader file(options.recording);
   if (!options.force && fs::exists(options.output) && !fs::is_empty(options.output)) {
     throw std::runtime_error(options.output + " is not empty: name another folder, or add --force");
   }
   fs::create_directories(options.output);
-  remove_earlier(options.output);
-  Exporter exporter(options);
+  // An earlier export stays until this one is whole.
+  const fs::path fresh = make_folder_in(options.output);
+  cli::RecordingReport report;
   try {
+    Exporter exporter(options, fresh);
     exporter.run(file);
+    replace_earlier(options.output, fresh);
+    report.set_frames(exporter.frames());
+    report.set_maps(exporter.maps());
   } catch (...) {
-    remove_earlier(options.output);
+    std::error_code ignored;
+    fs::remove_all(fresh, ignored);
     throw;
   }
-  cli::RecordingReport report;
+  fs::remove(fresh);
   report.set_output(options.output);
-  report.set_frames(exporter.frames());
-  report.set_maps(exporter.maps());
   report.set_damage(file.damage());
   report.set_out_of_order(file.out_of_order());
   if (context.json) {

@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <chrono>
+#include <cstdint>
 #include <cstring>
 #include <filesystem>
 #include <iostream>
@@ -89,11 +90,16 @@ class Setup {
     };
     if (given("--host") || given("--port")) return;
     // The unit's own daemon: others may listen on the usual port.
-    const Settings settings = settings_of(base::read_file(options_.config), options_.config);
-    const std::string port = value_of(settings, "net.port");
-    if (port.empty() || port.find_first_not_of("0123456789") != std::string::npos) return;
-    target_.port = static_cast<std::uint16_t>(std::stoi(port));
-    target_words_.insert(target_words_.end(), {"--port", port});
+    const DaemonTarget own =
+        target_of(base::read_file(options_.config), options_.unit, options_.config);
+    if (!own.host.empty()) {
+      target_.host = own.host;
+      target_words_.insert(target_words_.end(), {"--host", own.host});
+    }
+    if (!own.port.empty()) {
+      target_.port = static_cast<std::uint16_t>(std::stoi(own.port));
+      target_words_.insert(target_words_.end(), {"--port", own.port});
+    }
   }
 
   void run() {

@@ -5,16 +5,21 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
+#include <filesystem>
 #include <regex>
 #include <sstream>
 #include <stdexcept>
 #include <utility>
 
+#include "clients/common/exit_codes.hpp"
 #include "hal/files/key_reader.hpp"
+#include "proto/defaults.hpp"
 
 namespace dtact::ctl {
 namespace {
 
+namespace fs = std::filesystem;
 using hal::v4l2::Mode;
 
 constexpr double kWantedPixels = 800 * 600;
@@ -113,6 +118,40 @@ Settings settings_of(const std::string& toml, const std::string& where) {
   Settings settings;
   append(tomlfile::parse(toml, where), "", settings);
   return settings;
+}
+
+DaemonTarget target_of(const std::string& toml, const std::string& unit, const std::string& where) {
+  const toml::table table = tomlfile::parse(toml, where);
+  const toml::node_view<const toml::node> address = table.at_path("net.address");
+  const std::string listens = address.value_or(std::string(wire::kDefaultAddress));
+  if (listens.empty()) {
+    const auto socket = table.at_path("net.unix_socket").value_or(std::string());
+    // As the daemon reads it: a relative path starts at the configuration's folder.
+    if (!socket.empty()) {
+      return {"unix:" + fs::absolute(fs::path(where).parent_path() / socket).string(), ""};
+    }
+    // The RuntimeDirectory of its unit.
+    const std::size_t at = unit.find('@');
+    const std::string instance = at == std::string::npos ? "" : unit.substr(at + 1);
+    return {"unix:" + (fs::path("/run/dtactd") / instance / "dtactd.sock").string(), ""};
+  }
+  DaemonTarget target;
+  // At 0.0.0.0 and :: it can be reached as at the usual address.
+  if (listens != wire::kDefaultAddress && listens != "0.0.0.0" && listens != "::") {
+    target.host = listens;
+  }
+  const toml::node_view<const toml::node> port = table.at_path("net.port");
+  if (!port) return target;
+  const std::int64_t number = port.value_exact<std::int64_t>().value_or(0);
+  if (number < 1 || number > 65535) {
+    throw cli::Failure(
+        cli::kNotMet,
+        fmt::format("{}: net.port is no port that can be connected to: set it to a whole number "
+                    "from 1 to 65535, as {}",
+                    where, wire::kDefaultPort));
+  }
+  target.port = std::to_string(number);
+  return target;
 }
 
 std::string with_settings(const std::string& toml, const Settings& settings,

@@ -26,6 +26,19 @@ using Settings = std::vector<Setting>;
 [[nodiscard]] std::string with_settings(const std::string& toml, const Settings& settings,
                                         const std::string& where);
 
+/// How programs on this machine reach a daemon, as values of --host and --port; empty: the usual.
+struct DaemonTarget {
+  std::string host;
+  std::string port;
+  bool operator==(const DaemonTarget&) const = default;
+};
+
+/// The daemon that runs as the service `unit` by this configuration: at its TCP address, or at its
+/// socket where it has none. Throws cli::Failure naming `where` and net.port where no program can
+/// know the port, std::runtime_error as settings_of() does.
+[[nodiscard]] DaemonTarget target_of(const std::string& toml, const std::string& unit,
+                                     const std::string& where);
+
 /// A size and rate of the camera.
 struct ModeChoice {
   int width = 0;   ///< Pixels.

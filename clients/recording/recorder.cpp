@@ -122,6 +122,8 @@ void Recorder::run() {
     const std::scoped_lock lock(mutex_);
     failure_ = failure;
     queue_.clear();
+    // Neither what waited nor what the refused chunk held is in the file.
+    counts_.frames = writer_.frames();
     counts_.bytes = writer_.bytes();
   }
 }

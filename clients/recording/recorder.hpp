@@ -25,7 +25,7 @@ namespace dtact::recording {
 class Recorder {
  public:
   struct Counts {
-    std::uint64_t frames = 0;   ///< Written or waiting to be.
+    std::uint64_t frames = 0;   ///< Written or waiting to be; once it has failed, written.
     std::uint64_t dropped = 0;  ///< Because the queue was full.
     std::uint64_t bytes = 0;    ///< File size.
   };

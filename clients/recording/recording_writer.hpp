@@ -33,6 +33,8 @@ class RecordingWriter {
   void flush() { writer_.flush(); }
   void finish() { writer_.finish(); }
   [[nodiscard]] std::uint64_t bytes() const noexcept { return writer_.bytes(); }
+  /// Frames that the file holds so far, without those of the open chunk.
+  [[nodiscard]] std::uint64_t frames() const { return writer_.written(frame_); }
 
  private:
   struct Moment {

@@ -16,9 +16,9 @@ namespace {
 
 }  // namespace
 
-FileSink::FileSink(std::filesystem::path path, bool replace)
-    : path_(std::move(path)),
-      fd_(::open(path_.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC | (replace ? O_TRUNC : O_EXCL),
+FileSink::FileSink(const std::filesystem::path& path, bool replace, std::filesystem::path called)
+    : path_(called.empty() ? path : std::move(called)),
+      fd_(::open(path.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC | (replace ? O_TRUNC : O_EXCL),
                  0644)) {
   if (!fd_) fail(errno, path_);
 }

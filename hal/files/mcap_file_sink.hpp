@@ -23,14 +23,14 @@ class Sink {
 class FileSink final : public Sink {
  public:
   /// `replace`: a file of that name is emptied; else it is an error. Throws std::system_error with
-  /// the file's name.
-  FileSink(std::filesystem::path path, bool replace);
+  /// the file's name: `called`, where it will be renamed to that.
+  FileSink(const std::filesystem::path& path, bool replace, std::filesystem::path called = {});
 
   void append(std::string_view bytes) override;
   void sync() override;
 
  private:
-  std::filesystem::path path_;
+  std::filesystem::path path_;  // for sentences
   base::UniqueFd fd_;
   std::uint64_t size_ = 0;
 };

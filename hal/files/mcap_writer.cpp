@@ -298,6 +298,10 @@ void Writer::finish() {
 }
 
 std::uint64_t Writer::bytes() const noexcept { return impl_->offset; }
+std::uint64_t Writer::written(std::uint16_t channel) const {
+  const auto count = impl_->message_counts.find(channel);
+  return count == impl_->message_counts.end() ? 0 : count->second;
+}
 std::size_t Writer::open_bytes() const noexcept { return impl_->open.records.size(); }
 
 }  // namespace dtact::mcap

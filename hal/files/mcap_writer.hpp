@@ -51,6 +51,8 @@ class Writer {
 
   /// Size of the file so far, without the open chunk.
   [[nodiscard]] std::uint64_t bytes() const noexcept;
+  /// Messages of a channel that the file holds so far, without those of the open chunk.
+  [[nodiscard]] std::uint64_t written(std::uint16_t channel) const;
   /// Size of the open chunk, before compression.
   [[nodiscard]] std::size_t open_bytes() const noexcept;
 

@@ -183,6 +183,19 @@ TEST_F(Record, AFileIsNotReplacedUnasked) {
   EXPECT_THAT(said, HasSubstr(" frames in "));
 }
 
+TEST_F(Record, WithoutAFrameLeavesTheFileAsItWas) {
+  // Over before the first frame is asked for.
+  const std::string none = "0.0001";
+  std::string said;
+  EXPECT_EQ(run_program(command({"--seconds", none}), &said), 1);
+  EXPECT_THAT(said, HasSubstr("no frame came"));
+  EXPECT_FALSE(fs::exists(file));
+  base::write_file_atomically(file, "an earlier one");
+  EXPECT_EQ(run_program(command({"--seconds", none, "--force"}), &said), 1);
+  EXPECT_EQ(base::read_file(file), "an earlier one");
+  EXPECT_FALSE(fs::exists(file.string() + ".part"));
+}
+
 /// With a daemon that decodes at half the size.
 class RecordAtHalf : public Record {
  protected:

@@ -115,6 +115,20 @@ TEST_F(Setup, FromAnotherCameraToDepth) {
   EXPECT_THAT(output_, HasSubstr("is calibrated, by dtact-calibration; dtactctl setup calibrate"));
 }
 
+TEST_F(Setup, ReachesADaemonWithoutTcpByItsSocket) {
+  std::string text = base::read_file(config());
+  replace(text, "[net]", fmt::format("[net]\nunix_socket = \"{}\"", file("sock").string()));
+  replace(text, "\nunix_socket = \"\"", "");
+  replace(text, "address = \"127.0.0.1\"", "address = \"\"");
+  base::write_file_atomically(config(), text);
+  EXPECT_EQ(setup({"camera", "restart", "--camera", "sim"}), 0) << output_;
+  EXPECT_THAT(output_, HasSubstr("the service runs: camera sim:"));
+  // There is no depth yet, but watch gets as far as the daemon.
+  (void)setup({"watch"});
+  EXPECT_THAT(output_, HasSubstr(" --host unix:" + file("sock").string() + " watch"));
+  EXPECT_THAT(output_, Not(HasSubstr("nothing listens")));
+}
+
 TEST_F(Setup, StopsWithWhatToDoAndHowToGoOn) {
   const std::string before = base::read_file(config());
   EXPECT_EQ(setup({"--camera", "serial:none"}), kNotMet);

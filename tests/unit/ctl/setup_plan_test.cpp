@@ -7,7 +7,9 @@
 #include <algorithm>
 #include <filesystem>
 #include <stdexcept>
+#include <string>
 
+#include "clients/common/exit_codes.hpp"
 #include "hal/base/atomic_file.hpp"
 
 namespace dtact::ctl {
@@ -106,6 +108,30 @@ TEST(SetupPlan, TakesTheModeNearestToTheDaemons) {
   range.min_height = 16;
   range.fps_is_range = true;
   EXPECT_EQ(best_mode({range}), (ModeChoice{800, 600, 60}));
+}
+
+TEST(SetupPlan, FindsTheDaemonOfAConfiguration) {
+  const auto target = [](const std::string& net, const std::string& unit = "dtactd") {
+    return target_of("[net]\n" + net, unit, "/etc/dtactd/c.toml");
+  };
+  EXPECT_EQ(target(""), (DaemonTarget{"", ""}));
+  EXPECT_EQ(target("port = 7400"), (DaemonTarget{"", "7400"}));
+  EXPECT_EQ(target("address = \"::\"\nport = 7400"), (DaemonTarget{"", "7400"}));
+  EXPECT_EQ(target("address = \"192.0.2.7\"\nport = 7400"), (DaemonTarget{"192.0.2.7", "7400"}));
+  // Without TCP the port says nothing.
+  EXPECT_EQ(target("address = \"\"\nport = 0"), (DaemonTarget{"unix:/run/dtactd/dtactd.sock", ""}));
+  EXPECT_EQ(target("address = \"\"", "dtactd@left"),
+            (DaemonTarget{"unix:/run/dtactd/left/dtactd.sock", ""}));
+  EXPECT_EQ(target("address = \"\"\nunix_socket = \"/run/a.sock\"", "dtactd@left"),
+            (DaemonTarget{"unix:/run/a.sock", ""}));
+  EXPECT_EQ(target("address = \"\"\nunix_socket = \"a.sock\""),
+            (DaemonTarget{"unix:/etc/dtactd/a.sock", ""}));
+  for (const char* wrong : {"0", "70000", "99999999999", "-1", "7377.0", "\"7377\""}) {
+    EXPECT_THAT([&] { (void)target(std::string("port = ") + wrong); },
+                testing::ThrowsMessage<cli::Failure>(
+                    AllOf(HasSubstr("/etc/dtactd/c.toml: net.port"), HasSubstr("1 to 65535"))))
+        << wrong;
+  }
 }
 
 TEST(SetupPlan, ReadsAMode) {

@@ -76,7 +76,7 @@ TEST(CommandLine, HoldsEveryOptionThatWasGiven) {
 
 TEST(Usage, NamesEveryMeaningOfExitCodeFour) {
   for (const char* meaning : {"watch --min-fps", "bench: no frame", "find, fleet: no daemon",
-                              "guided: ended\nwithout a calibration"}) {
+                              "setup: a step is not done", "guided: ended without a calibration"}) {
     EXPECT_THAT(cli::kExitCodesHelp, HasSubstr(meaning));
   }
 }

@@ -128,6 +128,18 @@ TEST_F(Export, ForceReplacesAnEarlierExport) {
   EXPECT_TRUE(fs::exists(out_ / "depth-notes.png"));
 }
 
+TEST_F(Export, AFailedOneLeavesTheEarlierOne) {
+  ASSERT_EQ(run({"--to", "csv"}), 0) << said_;
+  base::write_file_atomically(out_ / "depth-1.png", "mine");
+  const std::string frames = read("frames.csv");
+  EXPECT_EQ(run({"--to", "png", "--force", "--frames", "9:"}), 1);
+  EXPECT_EQ(read("frames.csv"), frames);
+  ASSERT_EQ(run({"--to", "png", "--force", "--frames", "1:2"}), 0) << said_;
+  std::set<std::string> names;
+  for (const auto& entry : fs::directory_iterator(out_)) names.insert(entry.path().filename());
+  EXPECT_THAT(names, ElementsAre("depth-000001.png", "depth-1.png", "events.csv", "frames.csv"));
+}
+
 // NumPy would load the beginning of a stack as one without maps.
 TEST_F(Export, LeavesNoStackThatIsNotWhole) {
   mcap::FileSink sink(file_, true);

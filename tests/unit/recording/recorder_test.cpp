@@ -117,6 +117,8 @@ TEST_F(RecorderTest, AFullDiskEndsItAndLeavesTheFileReadable) {
               ThrowsMessage<std::system_error>(HasSubstr("No space left on device")));
   const Seen seen = read();
   EXPECT_EQ(seen.damage, "");  // the summary fitted
+  EXPECT_EQ(recorder.counts().frames, seen.frames.size());
+  EXPECT_LT(seen.frames.size(), sequence);
 }
 
 TEST_F(RecorderTest, WithoutFinishTheIndexIsMissing) {
