@@ -67,12 +67,12 @@ TEST(InputFiles, ARecordingsFirstFrameIsDecoded) {
   camera.backend = "replay";
   camera.replay.folder = folder;
   EXPECT_EQ(error([&] { check_camera_files(camera); }), "no error");
-  EXPECT_THAT(error([&] { app::check_devices({.camera = camera}); }),
+  EXPECT_THAT(error([&] { app::check_devices({.camera = camera, .ring = {}}); }),
               StartsWith((folder / "1.jpg").string() + ": "));
   std::filesystem::remove_all(folder);
   camera.backend = "sim";
   camera.sim.scene = folder;
-  EXPECT_THAT(error([&] { app::check_devices({.camera = camera}); }),
+  EXPECT_THAT(error([&] { app::check_devices({.camera = camera, .ring = {}}); }),
               StartsWith("camera.sim.scene = "));
 }
 
