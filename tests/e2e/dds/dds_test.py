@@ -294,8 +294,10 @@ class Topics(unittest.TestCase):
             here = time.clock_gettime_ns(time.CLOCK_REALTIME) - time.clock_gettime_ns(time.CLOCK_MONOTONIC)
             self.assertLess(abs(mapping.offset_ns - here), mapping.error_ns + 1_000_000)
             self.assertLess(mapping.error_ns, 20_000_000)
+            first = peer.next("rt/diagnostics", "diagnostic_msgs/DiagnosticArray").status
+            self.assertLess(max(one.level for one in first), 2, "nothing is wrong before a status has come")
             states = peer.next("rt/diagnostics", "diagnostic_msgs/DiagnosticArray",
-                               lambda one: all(status.level < 2 for status in one.status)).status
+                               lambda one: all(len(status.values) > 0 for status in one.status)).status
             self.assertEqual([one.name for one in states], ["left: dtactd", "right: dtactd"])
             values = {one.key: one.value for one in states[0].values}
             self.assertEqual(values["state"], "serving")
