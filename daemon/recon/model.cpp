@@ -163,7 +163,8 @@ Model for_scaled_frames(const Model& model, int scale) {
       std::int64_t column = 0;
       std::int64_t row = 0;
       for (int k = 0; k < scale; ++k) {
-        const auto first = fine.begin() + std::ptrdiff_t{y * scale + k} * fine_width + x * scale;
+        const auto first =
+            fine.begin() + std::ptrdiff_t{y * scale + k} * fine_width + std::ptrdiff_t{x} * scale;
         for (auto entry = first; entry != first + scale; ++entry) {
           column += entry->x * 128 + entry->fx;
           row += entry->y * 128 + entry->fy;

@@ -5,7 +5,6 @@
 
 #include <cerrno>
 #include <system_error>
-#include <utility>
 
 namespace dtact::mcap {
 namespace {
@@ -16,8 +15,9 @@ namespace {
 
 }  // namespace
 
-FileSink::FileSink(const std::filesystem::path& path, bool replace, std::filesystem::path called)
-    : path_(called.empty() ? path : std::move(called)),
+FileSink::FileSink(const std::filesystem::path& path, bool replace,
+                   const std::filesystem::path& called)
+    : path_(called.empty() ? path : called),
       fd_(::open(path.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC | (replace ? O_TRUNC : O_EXCL),
                  0644)) {
   if (!fd_) fail(errno, path_);

@@ -24,7 +24,8 @@ class FileSink final : public Sink {
  public:
   /// `replace`: a file of that name is emptied; else it is an error. Throws std::system_error with
   /// the file's name: `called`, where it will be renamed to that.
-  FileSink(const std::filesystem::path& path, bool replace, std::filesystem::path called = {});
+  FileSink(const std::filesystem::path& path, bool replace,
+           const std::filesystem::path& called = {});
 
   void append(std::string_view bytes) override;
   void sync() override;
