@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <map>
 #include <ostream>
 #include <sstream>
 #include <stdexcept>
@@ -104,15 +105,24 @@ toml::table parse_setting(const std::string& setting) {
   }
 }
 
-/// A recording has a size and a format of its own, and real cameras the format that they are set
-/// to.
+/// What else has to be set for frames to be decoded at a smaller size. A recording has a size and a
+/// format of its own.
 void check_decode_scale(const hal::CameraConfig& camera) {
   const int scale = camera.decode_scale;
-  if (scale != 1 && camera.backend == "null") {
-    throw std::runtime_error(fmt::format(
-        "camera.decode_scale = {} is for cameras with MJPEG; camera.backend = \"null\" has "
-        "none: set 1",
-        scale));
+  const std::map<std::string, std::pair<std::string, std::string>> formats = {
+      {"sim", {"camera.sim.output", camera.sim.output}},
+      {"v4l2", {"camera.v4l2.pixel_format", camera.v4l2.pixel_format}},
+      {"libcamera", {"camera.libcamera.pixel_format", camera.libcamera.pixel_format}},
+      {"null", {"camera.backend", camera.backend}}};
+  const auto found = formats.find(camera.backend);
+  if (scale != 1 && found != formats.end()) {
+    const auto& [key, value] = found->second;
+    if (value != "mjpeg" && value != "auto") {
+      throw std::runtime_error(
+          fmt::format("camera.decode_scale = {} needs MJPEG, which {} = \"{}\" does not give: set "
+                      "camera.decode_scale = 1 or take MJPEG",
+                      scale, key, value));
+    }
   }
   const bool divides = camera.width % scale == 0 && camera.height % scale == 0;
   if (divides || camera.backend == "replay") return;

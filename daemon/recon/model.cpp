@@ -149,7 +149,7 @@ Model for_scaled_frames(const Model& model, int scale) {
   Model scaled = decimate(model, scale);
   if (width % scale != 0 || height % scale != 0 || width < 2 * scale || height < 2 * scale) {
     throw std::invalid_argument("frames: " + std::to_string(width) + "x" + std::to_string(height) +
-                                " pixels cannot be halved to 1/" + std::to_string(scale));
+                                " pixels are no multiples of " + std::to_string(scale));
   }
   RectifyTable& table = scaled.rectify;
   table.frame_width = width / scale;

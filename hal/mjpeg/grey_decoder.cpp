@@ -199,9 +199,7 @@ std::string scale_error(int scale, std::string_view pixel_format) {
   if (scale == 1 || pixel_format == "MJPEG") return {};
   return fmt::format(
       "camera.decode_scale = {}: the frames are {}, and only MJPEG is decoded at a smaller size. "
-      "Set camera.decode_scale = 1 and a lower reconstruction.resolution, or pixel_format = "
-      "\"mjpeg\" "
-      "and a mode that has it",
+      "Set camera.decode_scale = 1 and a lower reconstruction.resolution, or a mode with MJPEG",
       scale, pixel_format);
 }
 

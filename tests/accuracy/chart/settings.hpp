@@ -19,8 +19,8 @@ namespace dtact::chart {
 /// One way to reconstruct.
 struct Setting {
   std::string name;  ///< "list full tiles 0.10", unique.
-  std::string
-      method;  ///< "published", "regression", "list", "several", "ours", "virtual balls", "MJPEG".
+  /// "published", "regression", "list", "several", "ours", "virtual balls", "MJPEG".
+  std::string method;
   int decimation = 1;         ///< 1, 2 or 4.
   bool tiles = false;         ///< Only the active tiles.
   double smoothing_mm = 0.1;  ///< Standard deviation; 0: the method's own.

@@ -166,6 +166,12 @@ TEST_F(ConfigFile, FramesAreDecodedAtASizeOfWholePixels) {
   EXPECT_THAT(error("[camera]\ndecode_scale = 3\n"), HasSubstr("camera.decode_scale"));
   EXPECT_THAT(error("[camera]\nbackend = \"null\"\ndecode_scale = 2\n"),
               AllOf(HasSubstr("camera.decode_scale = 2"), HasSubstr("camera.backend = \"null\"")));
+  EXPECT_THAT(error("[camera]\ndecode_scale = 2\n[camera.sim]\noutput = \"yuyv\"\n"),
+              HasSubstr("camera.sim.output = \"yuyv\""));
+  EXPECT_THAT(error("[camera]\nbackend = \"v4l2\"\ndecode_scale = 2\n[camera.v4l2]\n"
+                    "pixel_format = \"grey\"\n"),
+              HasSubstr("camera.v4l2.pixel_format = \"grey\""));
+  EXPECT_EQ(load("[camera]\nbackend = \"v4l2\"\ndecode_scale = 2\n").hal.camera.decode_scale, 2);
   EXPECT_EQ(load("[camera]\nwidth = 642\ndecode_scale = 2\n").hal.camera.decode_scale, 2);
 }
 

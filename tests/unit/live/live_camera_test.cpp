@@ -443,13 +443,18 @@ TEST(LiveCamera, AReopenedCamerasFirstFrameIsWaitedFor) {
   EXPECT_NE(rig.camera.report().state, CameraState::stalled);
 }
 
+/// Opens whatever `source` is then, a camera with an exposure of 100 to 10,000 µs.
+Opener with_exposure(const std::shared_ptr<LeasingSource>& source) {
+  return [&source]() -> Opened {
+    const CameraSetting exposure{8000, 100, 10000};
+    return {source, "the one", "GREY", {}, {.exposure_us = exposure, .gain = {}}};
+  };
+}
+
 // Nobody takes its frames during the opening: a source that needs them to change must know.
 TEST(LiveCamera, AReopenedCameraIsChangedBeforeItsFramesAreUsed) {
   auto source = std::make_shared<LeasingSource>();
-  LiveCamera camera(small(), "test", "nothing yet", [&source]() -> Opened {
-    const CameraSetting exposure{8000, 100, 10000};
-    return {source, "the one", "GREY", {}, {.exposure_us = exposure, .gain = {}}};
-  });
+  LiveCamera camera(small(), "test", "nothing yet", with_exposure(source));
   camera.start();
   camera.change({.exposure_us = 4000, .gain = {}});
   EXPECT_EQ(camera.info().settings.exposure_us->value, 4000);
@@ -465,10 +470,7 @@ TEST(LiveCamera, AReopenedCameraIsChangedBeforeItsFramesAreUsed) {
 
 TEST(LiveCamera, AChangeDuringAReopeningHoldsForTheNewConnection) {
   auto source = std::make_shared<LeasingSource>();
-  LiveCamera camera(small(), "test", "nothing yet", [&source]() -> Opened {
-    const CameraSetting exposure{8000, 100, 10000};
-    return {source, "the one", "GREY", {}, {.exposure_us = exposure, .gain = {}}};
-  });
+  LiveCamera camera(small(), "test", "nothing yet", with_exposure(source));
   camera.start();
   Frame frame;
   const auto first = source;

@@ -37,6 +37,10 @@ function sharp(canvas: HTMLCanvasElement): {
   return { context, width, height };
 }
 
+function greyAt(picture: LumaMap, row: number, column: number): number {
+  return picture.values[Math.floor(row) * picture.width + Math.floor(column)] as number;
+}
+
 export class Stage {
   private readonly canvas = el("canvas", { class: "map", width: "580", height: "580" });
   private readonly marksCanvas = el("canvas", {
@@ -183,28 +187,29 @@ export class Stage {
     if (!this.luma || !isPicture(this.view)) return;
     const { values, width, height } = this.luma;
     if (this.view === "camera") this.map.drawLuma(this.luma);
-    if (this.view === "camera" || this.referenceAt(0) === undefined) return;
+    const { reference } = this;
+    const scale = this.referenceScale();
+    if (this.view === "camera" || !reference || !scale) return;
     if (this.difference?.values.length !== values.length)
       this.difference = { width, height, values: new Uint8Array(values.length) };
     const grey = this.difference.values;
-    for (let i = 0; i < grey.length; ++i) {
-      const before = this.referenceAt(i) as number;
-      const level = 128 + CONTRAST * ((values[i] as number) - before);
-      grey[i] = Math.min(Math.max(level, 0), 255);
+    for (let i = 0, row = 0; row < height; ++row) {
+      for (let column = 0; column < width; ++column, ++i) {
+        const before = greyAt(reference, row / scale, column / scale);
+        const level = 128 + CONTRAST * ((values[i] as number) - before);
+        grey[i] = Math.min(Math.max(level, 0), 255);
+      }
     }
     this.map.drawLuma(this.difference);
   }
 
-  /** The reference at pixel `at` of the picture. A recording's pictures are whole, and its reference is of the
-   * size that the daemon decoded them at. */
-  private referenceAt(at: number): number | undefined {
+  /** Pixels of the picture for one of the reference; undefined where they do not fit each other. A
+   * recording's pictures are whole, and its reference is of the size that the daemon decoded them at. */
+  private referenceScale(): number | undefined {
     const { luma, reference } = this;
     if (!luma || !reference) return undefined;
     const scale = luma.width / reference.width;
-    if (![1, 2, 4].includes(scale) || reference.height * scale !== luma.height) return undefined;
-    const column = Math.floor((at % luma.width) / scale);
-    const row = Math.floor(Math.floor(at / luma.width) / scale);
-    return reference.values[row * reference.width + column];
+    return [1, 2, 4].includes(scale) && reference.height * scale === luma.height ? scale : undefined;
   }
 
   /** A sentence over the picture, empty for none, and a button below it. */
@@ -420,8 +425,11 @@ export class Stage {
     } else {
       const at = pixel.row * map.width + pixel.column;
       const grey = map.values[at] as number;
-      const before = this.view === "difference" ? this.referenceAt(at) : undefined;
-      const change = before === undefined ? "" : ` · reference ${before}`;
+      const scale = this.view === "difference" ? this.referenceScale() : undefined;
+      const change =
+        this.reference && scale
+          ? ` · reference ${greyAt(this.reference, pixel.row / scale, pixel.column / scale)}`
+          : "";
       say(this.readout, `grey ${grey} of 255${change} · ${where}${line}`);
     }
   }
