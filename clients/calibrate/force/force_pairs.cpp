@@ -74,9 +74,9 @@ void require_same_calibration(const mcap::Reader& file, const std::string& path,
     if (same_depth(*recorded.model, *calibration.model)) return;
   }
   throw std::runtime_error(fmt::format(
-      "{} was not measured with the calibration {}: dtact-calibrate reprocess {} --calibration {} "
-      "-o anew.mcap makes its depth anew",
-      path, calibration.name, path, calibration.name));
+      "{} was not measured with the calibration {}: dtact-calibrate reprocess {} --calibration "
+      "FOLDER -o NEW.mcap, with the folder of that calibration, makes its depth anew",
+      path, calibration.name, path));
 }
 
 [[noreturn]] void fail_beyond(const std::string& name) {

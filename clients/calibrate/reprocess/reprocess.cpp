@@ -5,13 +5,13 @@
 #include <algorithm>
 #include <filesystem>
 #include <memory>
-#include <numeric>
 #include <optional>
 #include <ostream>
 #include <stdexcept>
 #include <system_error>
 
 #include "clients/calibrate/reprocess/depth_reprocessor.hpp"
+#include "clients/common/interruptible.hpp"
 #include "clients/common/json.hpp"
 #include "clients/common/reports.pb.h"
 #include "clients/recording/channels.hpp"
@@ -102,12 +102,9 @@ class Reprocessor {
         writer_(sink_, {.program = context.target.program}) {}
 
   void run() {
+    find_status();
     if (!recording::find_attachment(file_, recording::kCurrentReferencePng)) take_first_frames();
     recording::RecordingHandlers handlers;
-    handlers.status = [this](const v1::Status& status, std::uint64_t) {
-      followed_ = status.light_followed();
-      return true;
-    };
     handlers.frame = [this](const v1::Frame& frame, std::uint64_t time) {
       take(frame, time);
       return true;
@@ -149,6 +146,17 @@ class Reprocessor {
   }
   [[nodiscard]] int frame_height() const {
     return calibration_->model->rectify.frame_height / frame_scale_;
+  }
+
+  /// The daemon's when the recording began. It lies behind the first frame, whose depth needs it.
+  void find_status() {
+    recording::RecordingHandlers handlers;
+    handlers.status = [this](const v1::Status& status, std::uint64_t) {
+      status_ = status;
+      status_->clear_calibration();  // that of the depth before
+      return false;
+    };
+    recording::read_recording(file_, handlers);
   }
 
   bool decode(const v1::Frame& frame) {
@@ -211,11 +219,14 @@ class Reprocessor {
                                            options_.recording, recording::kCurrentReferencePng,
                                            frame_width(), frame_height(), options_.calibration));
     }
-    remaker_.set_reference(image.pixels, first ? 1 + followed_ : 1);
+    remaker_.set_reference(image.pixels, first && status_ ? 1 + status_->light_followed() : 1);
     attach_due_ = true;
   }
 
   void take(v1::Frame frame, std::uint64_t time) {
+    if (cli::Interruptible::happened()) {
+      throw std::runtime_error("interrupted: nothing was written");
+    }
     follow_reference(time);
     const bool was_in_contact = remaker_.in_contact();
     const bool made = frame.has_jpeg() && measurable(frame) && decode(frame);
@@ -228,6 +239,7 @@ class Reprocessor {
     }
     writer_.add(frame);
     if (frames_++ == 0) {
+      if (status_) writer_.add(*status_);
       attach("calibration.toml", "application/toml", "calibration.toml");
       attach("reference.png", "image/png", "reference.png");
     }
@@ -265,7 +277,7 @@ class Reprocessor {
   recording::RecordingWriter writer_;
   std::string reference_png_;       // the PNG of the reference in use
   std::uint64_t reference_at_ = 0;  // its place in the file
-  double followed_ = 0;
+  std::optional<v1::Status> status_;
   bool attach_due_ = false;
   std::uint64_t frames_ = 0;
   std::uint64_t maps_ = 0;
@@ -278,6 +290,7 @@ void run(const cli::Context& context, const Options& options) {
   if (fs::exists(options.output) && fs::equivalent(options.recording, options.output)) {
     throw std::runtime_error(options.output + " is the recording itself: name another file");
   }
+  const cli::Interruptible while_writing;
   Reprocessor reprocessor(options, context);
   try {
     reprocessor.run();
