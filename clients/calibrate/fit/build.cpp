@@ -138,7 +138,7 @@ void check(const BallPress& press) {
 }  // namespace
 
 void check_sizes(double ball_radius_mm, double mm_per_px) {
-  if (!(ball_radius_mm > 0.1 && ball_radius_mm < 100)) {
+  if (!(ball_radius_mm >= 0.1 && ball_radius_mm <= 100)) {
     throw std::invalid_argument("the ball's radius must be 0.1 to 100 mm");
   }
   if (!(mm_per_px >= 0.001 && mm_per_px <= 1)) {
@@ -327,6 +327,16 @@ SettledPress settle(const recon::Model& model, std::span<const std::uint16_t> re
   return press;
 }
 
+SettledPress settle_unclipped(const recon::Model& model, const image::Grey16& reference_q8,
+                              const std::vector<image::Grey8>& frames, double ball_radius_mm) {
+  SettledPress press = settle(model, reference_q8.pixels, frames, ball_radius_mm);
+  refuse_clipped(rectified_reference(model.rectify, reference_q8), press.contact, model.mm_per_px,
+                 255, "the reference is white at the contact; lower the exposure or the light");
+  refuse_clipped(rectified_mean(model.rectify, frames), press.contact, model.mm_per_px, 0,
+                 "the ball's image is black at the contact; raise the exposure or the light");
+  return press;
+}
+
 bool same_place(const Contact& a, const Contact& b, double mm_per_px) noexcept {
   return std::hypot(a.col - b.col, a.row - b.row) * mm_per_px < 0.5 * a.radius_mm;
 }
@@ -359,13 +369,7 @@ Calibration build(const BallPress& press, PressChoices* choices) {
   if (press.method == recon::Method::lut) model->gain = gain_on_map(press.gain, calibration);
 
   SettledPress settled =
-      settle(*model, press.reference_q8.pixels, press.frames, press.ball_radius_mm);
-  const image::Grey8 reference = rectified_reference(model->rectify, press.reference_q8);
-  const image::Grey8 ball = rectified_mean(model->rectify, press.frames);
-  refuse_clipped(reference, settled.contact, press.mm_per_px, 255,
-                 "the reference is white at the contact; lower the exposure or the light");
-  refuse_clipped(ball, settled.contact, press.mm_per_px, 0,
-                 "the ball's image is black at the contact; raise the exposure or the light");
+      settle_unclipped(*model, press.reference_q8, press.frames, press.ball_radius_mm);
   if (press.method == recon::Method::lut) {
     const PressChoices chosen = choose(press, *model, settled);
     const SymmetricPress level =
@@ -374,7 +378,9 @@ Calibration build(const BallPress& press, PressChoices* choices) {
     if (choices != nullptr) *choices = chosen;
     model->uncertainty = uncertainty_of_zero(model->lut, std::span(&settled, 1), press.depth_mm);
   } else {
-    model->lut = fit_published(reference, ball, press.ball_radius_mm, press.mm_per_px);
+    model->lut = fit_published(rectified_reference(model->rectify, press.reference_q8),
+                               rectified_mean(model->rectify, press.frames), press.ball_radius_mm,
+                               press.mm_per_px);
     model->uncertainty = uncertainty_of_zero(model->lut, std::span(&settled, 1));
   }
   calibration.model = std::move(model);

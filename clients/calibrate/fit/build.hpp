@@ -34,6 +34,14 @@ struct SettledPress {
                                   std::span<const std::uint16_t> reference_q8,
                                   std::span<const image::Grey8> frames, double ball_radius_mm);
 
+/// settle() of a press to calibrate with. Throws std::runtime_error with the fix also where more
+/// than a hundredth of the contact is white in the reference or black in the frames: grey levels
+/// that were cut off there make the LUT too shallow.
+[[nodiscard]] SettledPress settle_unclipped(const recon::Model& model,
+                                            const image::Grey16& reference_q8,
+                                            const std::vector<image::Grey8>& frames,
+                                            double ball_radius_mm);
+
 /// Whether two contacts in one map are the same: their centres are less than half of the first's
 /// radius apart. Under another gain a dark part may darken by more than the ball.
 [[nodiscard]] bool same_place(const Contact& a, const Contact& b, double mm_per_px) noexcept;
@@ -85,8 +93,8 @@ struct PressChoices {
   [[nodiscard]] std::string describe() const;
 };
 
-/// Throws std::invalid_argument, saying which and the range, unless the ball's radius is above 0.1
-/// and below 100 mm and the scale 0.001 to 1 mm a pixel.
+/// Throws std::invalid_argument, saying which and the range, unless the ball's radius is 0.1 to
+/// 100 mm and the scale 0.001 to 1 mm a pixel.
 void check_sizes(double ball_radius_mm, double mm_per_px);
 
 /// A calibration without a LUT: frame, crop (none: the whole frame), scale, lens,

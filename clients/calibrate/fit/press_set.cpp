@@ -33,7 +33,8 @@ std::vector<SettledPress> settle_all(const recon::Model& model, BallPresses& set
   std::vector<BallPresses::Press> used;
   for (BallPresses::Press& press : set.presses) {
     try {
-      presses.push_back(settle(model, set.reference_q8.pixels, press.frames, set.ball_radius_mm));
+      presses.push_back(
+          settle_unclipped(model, set.reference_q8, press.frames, set.ball_radius_mm));
       used.push_back(std::move(press));
     } catch (const std::runtime_error& e) {
       left_out.push_back(fmt::format("{}: {}", press.name, e.what()));
@@ -49,16 +50,21 @@ std::vector<SettledPress> settle_all(const recon::Model& model, BallPresses& set
   return presses;
 }
 
-/// Name and reason of a press that is not too faint as a share of the light and yet lost or found
-/// elsewhere; empty: none. In dark parts a few grey levels are a large share of the light.
+/// Why as a share of the light the presses make no chain, with the press's name; empty: they do.
+/// In dark parts a few grey levels are a large share of the light, and a faint press in a bright
+/// part may be none.
 std::string lost_to_the_share(const recon::Model& uniform, const BallPresses& set,
                               const std::vector<SettledPress>& seen) {
+  std::size_t found = 0;
   for (std::size_t p = 0; p < seen.size(); ++p) {
     const BallPresses::Press& press = set.presses[p];
     try {
       const Contact lit =
           settle(uniform, set.reference_q8.pixels, press.frames, set.ball_radius_mm).contact;
-      if (same_place(seen[p].contact, lit, set.mm_per_px)) continue;
+      if (same_place(seen[p].contact, lit, set.mm_per_px)) {
+        ++found;
+        continue;
+      }
       return fmt::format(
           "{}: the most of its light is lost at column {:.0f}, row {:.0f} of the depth map",
           press.name, lit.col, lit.row);
@@ -68,7 +74,7 @@ std::string lost_to_the_share(const recon::Model& uniform, const BallPresses& se
       return fmt::format("{}: {}", press.name, e.what());
     }
   }
-  return {};
+  return found < 2 ? "fewer than two are dark enough" : "";
 }
 
 /// One gain, and the agreement of the presses under it.

@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <memory>
 #include <stdexcept>
 #include <utility>
@@ -61,6 +62,13 @@ Made make_lut(const DepthOptions& options) {
   PressImages images = begin_presses(options.reference, options.radius_mm, options.map);
   if (!options.ball.empty()) add_press(images, options.ball, "--ball");
   for (const std::string& press : options.presses) add_press(images, press);
+  const bool measured = std::ranges::any_of(
+      images.set.presses, [](const auto& press) { return press.depth_mm.has_value(); });
+  if (measured && (options.method == "model" || options.method == "regression")) {
+    throw std::runtime_error(fmt::format(
+        "--method {} does not use measured depths: leave @MM out, or take --method auto or list",
+        options.method));
+  }
   if (options.method == "regression") {
     calibration::Calibration made =
         calibration::build_regression(images.set, options.gain_centre[0], options.gain_centre[1]);

@@ -138,6 +138,36 @@ TEST(BuildFromPresses, UnevenLightPaysForAGain) {
   EXPECT_NEAR(report.presses[3].depth_mm, 1.0, 0.03);
 }
 
+// Before: it was refused in one press and taken in several.
+TEST(BuildFromPresses, LeavesOutWhatIsWhiteOrBlack) {
+  const std::vector<Ball> balls = {Ball{.depth_mm = 0.5}, Ball{.depth_mm = 0.75},
+                                   Ball{.depth_mm = 1.0}};
+  BallPresses white = set_of(balls);
+  std::ranges::fill(white.reference_q8.pixels, std::uint16_t{255 * 256});
+  for (auto& press : white.presses) {  // of a light of 260 levels
+    for (auto& pixel : press.frames[0].pixels) {
+      pixel = static_cast<std::uint8_t>(std::min(255, pixel + 60));
+    }
+  }
+  EXPECT_THAT([&] { (void)build(white); },
+              ThrowsMessage<std::runtime_error>(HasSubstr("white at the contact")));
+  BallPresses black = set_of(balls);
+  for (auto& press : black.presses) {
+    for (auto& pixel : press.frames[0].pixels) pixel = pixel < 190 ? 0 : pixel;
+  }
+  EXPECT_THAT([&] { (void)build(black); },
+              ThrowsMessage<std::runtime_error>(HasSubstr("black at the contact")));
+}
+
+// The shallower press is 9 grey levels dark at its deepest, and 8 as a share of the light.
+TEST(BuildFromPresses, APressThatIsTooFaintAsAShareOfTheLightCostsNoChain) {
+  BallPresses set = set_of({Ball{.col = 60, .depth_mm = 0.31}, Ball{.col = 110, .depth_mm = 0.6}});
+  shade(set);
+  PressReport report;
+  EXPECT_NO_THROW((void)build(set, &report));
+  EXPECT_EQ(report.presses.size(), 2U);
+}
+
 /// Eight presses at different places and depths.
 std::vector<Ball> eight_balls() {
   return {

@@ -70,7 +70,7 @@ UsablePresses look(const recon::Model& model, const BallPresses& set) {
   for (const BallPresses::Press& press : set.presses) {
     try {
       seen.presses.push_back(
-          settle(model, set.reference_q8.pixels, press.frames, set.ball_radius_mm));
+          settle_unclipped(model, set.reference_q8, press.frames, set.ball_radius_mm));
       seen.names.push_back(press.name);
     } catch (const std::runtime_error& e) {
       seen.left_out.push_back(fmt::format("{}: {}", press.name, e.what()));
