@@ -26,28 +26,28 @@ constexpr double kDrift = 0.5;
 /// A press that differs less from the one before in every cell is the same.
 constexpr double kSamePress = 2.0;
 constexpr int kBrighterFrames = 5;
-/// Waits without a frame before the user gets a message, two seconds.
-constexpr int kMisses = 20;
+/// Time without a usable frame before the user gets a message.
+constexpr std::chrono::seconds kMaxUnusable{2};
 
-/// Ends a wait by the frames' times, or without frames by the number of waits.
-class Timeout {
+/// Measures a wait by the frames' times, or without frames by the number of waits. Frames that
+/// cannot be used count by their times too: each ends next() at once.
+class WaitTime {
  public:
-  explicit Timeout(double seconds) : seconds_(seconds) {}
-  bool over(const ObservedFrame* look) {
-    if (look == nullptr) {
-      without_s_ += std::chrono::duration<double>(kFrameWait).count();
-    } else {
-      if (first_ns_ == 0) first_ns_ = look->time_ns;
-      with_s_ = 1e-9 * static_cast<double>(look->time_ns - first_ns_);
+  /// `frame_ns`: time of the frame that came; empty: none in kFrameWait.
+  void add(const std::optional<std::int64_t>& frame_ns) {
+    if (!frame_ns) {
+      without_ += kFrameWait;
+      return;
     }
-    return std::max(with_s_, without_s_) > seconds_;
+    if (!first_ns_) first_ns_ = frame_ns;
+    with_ = std::chrono::nanoseconds(*frame_ns - *first_ns_);
   }
+  [[nodiscard]] std::chrono::nanoseconds length() const { return std::max(with_, without_); }
 
  private:
-  double seconds_;
-  double with_s_ = 0;
-  double without_s_ = 0;
-  std::int64_t first_ns_ = 0;  // 0: no frame yet
+  std::chrono::nanoseconds with_{0};
+  std::chrono::nanoseconds without_{0};
+  std::optional<std::int64_t> first_ns_;
 };
 
 CellMeans mean_of(const std::vector<CellMeans>& all, std::size_t first, std::size_t last) {
@@ -82,6 +82,8 @@ Capture::Capture(Sensor& sensor, Console& console, const CellGrid& grid, const R
 const ObservedFrame* Capture::next() {
   if (console_.interrupted()) throw Ended{Ended::Why::interrupt};
   auto frame = sensor_.next(kFrameWait);
+  read_ns_.reset();
+  if (frame) read_ns_ = frame->monotonic_ns();
   if (!frame || !frame->has_luma() || passing_trouble(frame->health())) return nullptr;
   if (!leds_.empty() && leds_of(frame->light()) != leds_) {
     throw std::runtime_error(
@@ -101,23 +103,27 @@ std::string Capture::trouble() {
                      client::name_of(status.state()), status.advice());
 }
 
-bool Capture::line_typed() {
+bool Capture::enter_typed() {
   if (!console_.interactive()) return false;
   const Typed typed = console_.typed();
   if (typed.kind == Typed::Kind::interrupted) throw Ended{Ended::Why::interrupt};
   if (typed.kind == Typed::Kind::end) throw Ended{Ended::Why::input};
   if (typed.line == "q") throw Ended{Ended::Why::quit};
-  return typed.kind == Typed::Kind::line;
+  if (typed.kind != Typed::Kind::line) return false;
+  if (!typed.line.empty()) console_.say("\"" + typed.line + "\" means nothing here");
+  return typed.line.empty();
 }
 
 SteadyFrames Capture::hold(int count, bool forcible, const Objection& objection) {
   Steadiness steadiness(kStill);
-  Timeout timeout(rules_.timeout_s);
+  const std::chrono::duration<double> timeout(rules_.timeout_s);
+  WaitTime waited;
+  WaitTime unusable;  // since the last usable frame
   SteadyFrames still;
   std::vector<CellMeans> cells;
   std::string why;
   bool force = false;
-  int misses = 0;
+  bool reported = false;
   const auto restart = [&](std::string reason) {
     why = std::move(reason);
     still.frames.clear();
@@ -125,18 +131,25 @@ SteadyFrames Capture::hold(int count, bool forcible, const Objection& objection)
   };
   for (;;) {
     const ObservedFrame* look = next();
-    if (timeout.over(look)) {
+    waited.add(read_ns_);
+    if (waited.length() > timeout) {
       throw CaptureTimeout(fmt::format("not taken within {:g} s: {}", rules_.timeout_s,
                                        look == nullptr ? trouble() : why));
     }
-    force = (line_typed() && forcible) || force;
+    force = (enter_typed() && forcible) || force;
     if (look == nullptr) {
-      if (++misses == kMisses) console_.say(trouble());
+      unusable.add(read_ns_);
+      if (unusable.length() >= kMaxUnusable && !reported) {
+        console_.say(trouble());
+        reported = true;
+      }
       restart("");
       steadiness.restart();
       continue;
     }
-    misses = 0;
+    unusable = {};
+    unusable.add(read_ns_);
+    reported = false;
     std::string against = objection(*look);
     if (!against.empty()) {
       shown_(*look, against);

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <cstdint>
 #include <functional>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -56,25 +58,26 @@ class Capture {
   /// Frames must have this light from now on (r, g, b of each LED after brightness).
   void expect_light(std::vector<std::uint8_t> leds) { leds_ = std::move(leds); }
 
-  /// The next usable frame; null when none came in 100 ms. Throws Ended on Ctrl-C,
-  /// std::runtime_error when the light is another.
+  /// The next usable frame; null when no frame came in 100 ms or it cannot be used. Throws Ended on
+  /// Ctrl-C, std::runtime_error when the light is another.
   [[nodiscard]] const ObservedFrame* next();
 
   /// Waits for `count` consecutive still frames. Throws CaptureTimeout, Ended and like next().
   [[nodiscard]] SteadyFrames reference(int count);
   /// Waits for an object in contact, at another position or depth than in `last` (empty: none), and
-  /// captures it. A line typed meanwhile captures the press as it is. Throws
+  /// captures it. Enter typed meanwhile captures the press as it is. Throws
   /// ReferenceInContact too.
   [[nodiscard]] SteadyFrames press(int count, const CellMeans& reference, const CellMeans& last);
 
  private:
   /// Objection to a frame; empty: none.
   using Objection = std::function<std::string(const ObservedFrame&)>;
-  /// `forcible`: a line typed meanwhile takes the present frames.
+  /// `forcible`: Enter typed meanwhile takes the present frames.
   [[nodiscard]] SteadyFrames hold(int count, bool forcible, const Objection& objection);
   [[nodiscard]] std::string trouble();
-  /// Whether a waiting user typed a line. Throws Ended.
-  [[nodiscard]] bool line_typed();
+  /// Whether a waiting user typed Enter alone; tells them that other words have no meaning here.
+  /// Throws Ended.
+  [[nodiscard]] bool enter_typed();
 
   Sensor& sensor_;
   Console& console_;
@@ -83,6 +86,8 @@ class Capture {
   std::function<void(const ObservedFrame&, const std::string&)> shown_;
   std::vector<std::uint8_t> leds_;
   ObservedFrame observed_;
+  /// Time of the frame that next() read, usable or not; empty: none came.
+  std::optional<std::int64_t> read_ns_;
 };
 
 }  // namespace dtact::ctl::guided

@@ -11,6 +11,7 @@
 #include "clients/calibrate/fit/evaluate.hpp"
 #include "clients/calibrate/guided/sensor_checks.hpp"
 #include "daemon/calibration/text.hpp"
+#include "daemon/pipeline/reference/calibrated_image.hpp"
 #include "hal/base/atomic_file.hpp"
 
 namespace dtact::ctl::guided {
@@ -97,6 +98,8 @@ void Session::prepare_map(const v1::Status& status) {
   image::Grey16 black{width, height, {}};
   black.pixels.resize(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
   empty_ = calibration::empty_calibration(black, map.crop, map.mm_per_px, map.lens);
+  // Comes before the first image: the daemon would refuse such a map only at the upload.
+  pipeline::require_coverage(empty_.model->rectify, folder_.calibration_name());
   grid_ = CellGrid(recon::region_read(empty_.model->rectify));
   cell_mm_ = grid_.cell_px() * (map.lens ? recon::central_mm_per_px(*map.lens) : map.mm_per_px);
   view_.use(empty_, {}, cell_mm_);
@@ -272,7 +275,6 @@ void Session::take_press(const std::string& name) {
   }
   const SteadyFrames still = capture_->press(plan_.press_frames, reference_, last_);
   view_.set_prompt({});
-  last_ = still.cells;
   calibration::Contact contact;
   try {
     contact = calibration::settle(*empty_.model, images_.set.reference_q8.pixels, still.frames,
@@ -285,6 +287,7 @@ void Session::take_press(const std::string& name) {
   }
   const bool again = std::ranges::count(folder_.presses(), name) > 0;
   folder_.save_press(name, still.frames);
+  last_ = still.cells;
   if (again) {
     load();
   } else {
@@ -351,10 +354,14 @@ Outcome Session::finish() {
   calibration::save(*coverage_.made, folder_.path() / kCalibration);
   console_.say(report_text(coverage_.report) + lut_text(*coverage_.made->model) +
                (console_.at_terminal() ? "saved in " + folder_.at(kCalibration) : "saved"));
-  const std::string line =
-      ask({fmt::format("Upload it to the daemon as {}?", folder_.calibration_name()),
-           {{"", "yes"}, {"n", "not now"}}});
-  if (line.empty() || line == "y") {
+  std::string line;
+  try {
+    line = ask({fmt::format("Upload it to the daemon as {}?", folder_.calibration_name()),
+                {{"", "yes"}, {"n", "not now"}}});
+  } catch (const Ended&) {
+    line = "n";  // The calibration is saved, so the session has succeeded.
+  }
+  if (line.empty() || line == "y" || line == "yes") {
     upload();
     return Outcome::uploaded;
   }

@@ -67,6 +67,7 @@ class Session {
   /// Makes the calibration with the chosen method, once for the present presses; returns
   /// whether it succeeded. If not, coverage_.missing has the reason.
   [[nodiscard]] bool make();
+  /// Saves the calibration and offers the upload; an end of the session there means no.
   [[nodiscard]] Outcome finish();
   void upload();
 

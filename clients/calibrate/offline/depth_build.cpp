@@ -16,6 +16,7 @@
 #include "clients/calibrate/fit/model/model_build.hpp"
 #include "clients/common/program.hpp"
 #include "daemon/calibration/sensor_files.hpp"
+#include "daemon/pipeline/reference/calibrated_image.hpp"
 
 namespace dtact::ctl {
 namespace {
@@ -77,6 +78,19 @@ double scale_of(const std::vector<double>& ruler, int width, int height) {
                     ruler[4], pixels, scale, kMinScale, kMaxScale));
   }
   return scale;
+}
+
+/// A LUT at the assumed height: of the known sphere or, where its presses do not suffice and a gel
+/// may make up for them, of that.
+recon::DepthLut rough_lut(const calibration::BallPresses& set, const recon::FlatFieldGain& gain,
+                          FitMethod method) {
+  try {
+    calibration::PressReport unused;
+    return calibration::build_from_sphere(set, gain, unused).model->lut;
+  } catch (const std::runtime_error&) {
+    if (method == FitMethod::alone) throw;
+    return calibration::build_model(set, gain).calibration.model->lut;
+  }
 }
 
 /// Splits "FOLDER@0.8" into the images and the measured depth.
@@ -257,9 +271,7 @@ calibration::Calibration build_lut(const PressImages& images, FitMethod method,
   calibration::BallPresses set = images.set;
   if (set.view.per_mm == 0 && set.view.source != calibration::HeightSource::unknown) {
     // A LUT at the assumed height turns the board's grey levels into millimetres.
-    calibration::PressReport unused;
-    set.view = calibration::view_with(
-        set.view, calibration::build_from_sphere(set, images.gain, unused).model->lut);
+    set.view = calibration::view_with(set.view, rough_lut(set, images.gain, method));
   }
   set.view = calibration::view_of_presses(set);
   if (method == FitMethod::automatic) {
@@ -290,6 +302,8 @@ calibration::Calibration build_lut(const PressImages& images, FitMethod method,
 
 void save_or_refuse(const calibration::Calibration& made, const std::vector<std::string>& doubts,
                     bool force, const std::string& folder, const std::string& hint) {
+  // Comes before the doubts: the daemon refuses such a map even where --force has written it.
+  pipeline::require_coverage(made.model->rectify, folder);
   if (!doubts.empty() && !force) {
     throw std::runtime_error(fmt::format("{}{}; nothing was written (--force writes it as it is)",
                                          fmt::join(doubts, "; "), hint));

@@ -26,17 +26,24 @@ CellRegion cells_within(const recon::RectifyTable& table) {
 
 }  // namespace
 
+void require_coverage(const recon::RectifyTable& table, const std::string& name) {
+  constexpr int kMinCells = 8;
+  const CellRegion region = cells_within(table);
+  if (region.x1 - region.x0 >= kMinCells && region.y1 - region.y0 >= kMinCells) return;
+  // A crop of nine cells has eight whole ones wherever it lies.
+  throw std::invalid_argument(
+      fmt::format("calibration \"{}\" covers {}x{} pixels of the frame, too little to tell light "
+                  "from contact: calibrate with a crop of at least a quarter of the frame's width "
+                  "and three tenths of its height",
+                  name, table.width, table.height));
+}
+
 CalibratedImage::CalibratedImage(std::shared_ptr<const calibration::Calibration> of)
     : calibration(std::move(of)),
       region(cells_within(calibration->model->rectify)),
       cells(recon::CellLattice(calibration->model->rectify)) {
   const recon::RectifyTable& table = calibration->model->rectify;
-  if (region.x1 - region.x0 < 8 || region.y1 - region.y0 < 8) {
-    throw std::invalid_argument(
-        fmt::format("calibration \"{}\" covers {}x{} pixels of the frame, too little to tell light "
-                    "from contact: calibrate with a crop of at least a quarter of each side",
-                    calibration->name, table.width, table.height));
-  }
+  require_coverage(table, calibration->name);
   const std::vector<std::uint16_t>& reference_q8 = calibration->model->reference_q8;
   measure(reference_q8, table.frame_width, table.frame_height, grid);
   const int x = cell_edge(region.x0, kGridWidth, table.frame_width);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <string>
 
 #include "daemon/calibration/calibration.hpp"
 #include "daemon/pipeline/reference/cells.hpp"
@@ -10,11 +11,14 @@
 
 namespace dtact::pipeline {
 
+/// Throws std::invalid_argument with the fix when a calibration covers too little of the frame to
+/// distinguish light changes from contact. `name`: the calibration's, for the message.
+void require_coverage(const recon::RectifyTable& table, const std::string& name);
+
 /// What a calibration says of the reference image, with the memory to compare frames with it: made
 /// on the network's side, used on the capture thread.
 struct CalibratedImage {
-  /// Throws std::invalid_argument with the fix when the calibration covers too little of the
-  /// frame to distinguish light changes from contact.
+  /// Throws like require_coverage().
   explicit CalibratedImage(std::shared_ptr<const calibration::Calibration> of);
 
   std::shared_ptr<const calibration::Calibration> calibration;

@@ -112,6 +112,27 @@ TEST_F(GuidedSession, TheBatchCommandReadsTheWorkFolder) {
   EXPECT_EQ(batch.origin.leds, guided.origin.leds);
 }
 
+TEST_F(GuidedSession, AnEndAtTheUploadKeepsTheCalibration) {
+  for (const char* end : {"quit", "input"}) {
+    plan_.folder = plan_.folder.parent_path() / end;
+    std::deque<std::string> lines(5);
+    if (end == std::string("quit")) lines.emplace_back("q");
+    FakeSensor sensor(kEnough);
+    FakeConsole console(lines);
+    EXPECT_EQ(run(sensor, console), Outcome::kept) << console.said;
+    EXPECT_THAT(console.said, AllOf(HasSubstr("later: dtactctl calibration upload"),
+                                    Not(HasSubstr("before there was a calibration"))));
+    EXPECT_TRUE(has("calibration"));
+    EXPECT_FALSE(sensor.uploaded.has_value());
+  }
+}
+
+TEST_F(GuidedSession, YesUploads) {
+  FakeSensor sensor(kEnough);
+  FakeConsole console({"", "", "", "", "", "yes"});
+  EXPECT_EQ(run(sensor, console), Outcome::uploaded) << console.said;
+}
+
 TEST_F(GuidedSession, ADoubtfulLutIsNotMadeUnlessForced) {
   plan_.map.mm_per_px = 0.005;
   {
@@ -224,6 +245,26 @@ TEST_F(GuidedSession, APersonMayTakeWhatDoesNotHoldStill) {
   EXPECT_THAT(console.said, HasSubstr("press-01 taken"));
 }
 
+// 1.2 mm a second: it holds still for three frames at most.
+TEST_F(GuidedSession, OnlyEnterTakesWhatDoesNotHoldStill) {
+  FakeSensor sensor({kContactFree, {.depth_mm = 0.5, .frames = 1000, .step_mm = 0.02}});
+  FakeConsole console({"", "~25", "", "~3", "s", "~50", "q"});
+  console.person = true;
+  EXPECT_EQ(run(sensor, console), Outcome::unfinished);
+  EXPECT_THAT(console.said,
+              AllOf(HasSubstr("\"s\" means nothing here"), Not(HasSubstr("press-01 taken"))));
+}
+
+// Its contact leaves the map.
+TEST_F(GuidedSession, ARefusedPressIsNotTakenAlready) {
+  FakeSensor sensor({kContactFree, {.depth_mm = 1.3, .x_px = 20}});
+  FakeConsole console({"", "", "", "q"});
+  EXPECT_EQ(run(sensor, console), Outcome::unfinished) << console.said;
+  const std::string refused = "not taken: the contact";
+  EXPECT_THAT(console.said, AllOf(HasSubstr(refused), Not(HasSubstr("taken already"))));
+  EXPECT_NE(console.said.find(refused), console.said.rfind(refused)) << console.said;
+}
+
 TEST_F(GuidedSession, ATooLightPressIsRefusedAndNotKept) {
   FakeSensor sensor(presses({{.depth_mm = 0.22}}));
   FakeConsole console({"", "", "q"});
@@ -313,6 +354,52 @@ TEST_F(GuidedSession, SaysWhyNothingComes) {
   FakeConsole console({""});
   EXPECT_THAT([&] { (void)run(sensor, console); },
               ThrowsMessage<CaptureTimeout>(HasSubstr("Look at the cable.")));
+}
+
+/// No contact, with a passing health flag in the first `flagged` frames.
+class FlaggedSensor : public FakeSensor {
+ public:
+  explicit FlaggedSensor(std::uint32_t flagged) : FakeSensor({kContactFree}) {
+    now.add_health(v1::HEALTH_LIGHT_UNSETTLED);
+    paint = [this, flagged](const Scene& scene) {
+      if (++frames_ == flagged) now.clear_health();
+      return test::picture(scene, scene.depth_mm, frames_);
+    };
+  }
+
+ private:
+  std::uint32_t frames_ = 0;
+};
+
+// 90 frames are 1.5 s at any rate: neither the message's two seconds nor the limit's eight.
+TEST_F(GuidedSession, UnusableFramesCountByTheirTimes) {
+  FlaggedSensor sensor(90);
+  FakeConsole console({"", "q"});
+  EXPECT_EQ(run(sensor, console), Outcome::unfinished) << console.said;
+  EXPECT_THAT(console.said,
+              AllOf(HasSubstr("reference taken"), Not(HasSubstr("no usable frame came"))));
+}
+
+TEST_F(GuidedSession, SaysOnceThatNoFrameIsUsable) {
+  FlaggedSensor sensor(270);  // 4.5 s
+  FakeConsole console({"", "q"});
+  EXPECT_EQ(run(sensor, console), Outcome::unfinished) << console.said;
+  const std::string message = "no usable frame came";
+  EXPECT_THAT(console.said, AllOf(HasSubstr("reference taken"), HasSubstr(message)));
+  EXPECT_EQ(console.said.find(message), console.said.rfind(message)) << console.said;
+}
+
+// The daemon would refuse the calibration: 6 of its 40 columns and of its 30 rows lie within.
+TEST_F(GuidedSession, RefusesATooSmallCropBeforeTheFirstImage) {
+  FakeSensor sensor(kEnough);
+  sensor.now.mutable_camera()->set_width(640);
+  sensor.now.mutable_camera()->set_height(480);
+  plan_.map.crop = {120, 120};
+  FakeConsole console({});
+  EXPECT_THAT([&] { (void)run(sensor, console); },
+              ThrowsMessage<std::invalid_argument>(
+                  AllOf(HasSubstr("\"ball\" covers 120x120"), HasSubstr("three tenths"))));
+  EXPECT_THAT(console.said, Not(HasSubstr("Step 1")));
 }
 
 TEST_F(GuidedSession, AnotherLightIsRefused) {

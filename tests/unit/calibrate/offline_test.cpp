@@ -436,5 +436,21 @@ TEST(BuildLut, PressesShowTheCamerasHeight) {
   EXPECT_EQ(calibration::view_of_presses(images.set), images.set.view);
 }
 
+// CropIsAboutTheCentre's crop in a larger frame: 6 of the daemon's 40 columns and of its 30 rows
+// lie within, and it would refuse the calibration.
+TEST_F(Offline, RefusesACropThatTheDaemonRefuses) {
+  const Ball ball{.col = 595.25, .row = 445.5, .width = 1200, .height = 900};
+  write("reference.png", ball.reference_image());
+  write("ball.png", ball.frame());
+  const auto cropped = with(calibrate(), "--centre", "600,450", "--force", "--crop");
+  EXPECT_THAT([&] { run(with(cropped, "180,200")); },
+              ThrowsMessage<std::invalid_argument>(
+                  AllOf(HasSubstr("covers 180x200"), HasSubstr("three tenths"))));
+  EXPECT_FALSE(fs::exists(at("cal")));
+  // The size that the message names.
+  run(with(cropped, "300,270"));
+  EXPECT_TRUE(fs::exists(at("cal")));
+}
+
 }  // namespace
 }  // namespace dtact::ctl

@@ -49,8 +49,9 @@ ROOMS = {
     "clients/calibrate/fit": ["hal/files", "daemon/recon", "daemon/calibration"],
     "clients/calibrate/fit/model": ["daemon/recon", "daemon/calibration", "clients/calibrate/fit"],
     "clients/calibrate/lens": ["daemon/recon"],
-    "clients/calibrate/offline": ["hal/base", "hal/files", "daemon/recon", "daemon/calibration", "clients/common", "clients/calibrate/fit", "clients/calibrate/fit/model", "clients/calibrate/lens"],
-    "clients/calibrate/guided": ["hal/base", "hal/files", "proto", "daemon/recon", "daemon/calibration", "clients/common", "clients/cpp", "clients/calibrate/fit", "clients/calibrate/offline"],
+    # These two refuse a crop that the daemon would refuse, with its own check.
+    "clients/calibrate/offline": ["hal/base", "hal/files", "daemon/recon", "daemon/calibration", "daemon/pipeline/reference", "clients/common", "clients/calibrate/fit", "clients/calibrate/fit/model", "clients/calibrate/lens"],
+    "clients/calibrate/guided": ["hal/base", "hal/files", "proto", "daemon/recon", "daemon/calibration", "daemon/pipeline/reference", "clients/common", "clients/cpp", "clients/calibrate/fit", "clients/calibrate/offline"],
     # Reprocesses a recording's depth with the daemon's own code.
     "clients/calibrate/reprocess": ["hal", "hal/base", "hal/files", "hal/luma", "hal/mjpeg", "proto", "daemon/calibration", "daemon/pipeline/reference", "daemon/pipeline/depth", "clients/common", "clients/recording"],
     # Contacts of pictures and of recordings.
