@@ -39,11 +39,13 @@ using Samples = std::vector<Sample>;
   throw std::runtime_error(path.string() + ": " + sentence);
 }
 
+/// Sorted; without hidden ones.
 Names entries(const fs::path& folder, bool folders) {
   if (!fs::is_directory(folder)) refuse(folder, "there is no such folder");
   Names names;
   for (const auto& entry : fs::directory_iterator(folder)) {
-    if (entry.is_directory() == folders) names.push_back(entry.path().filename().string());
+    const std::string name = entry.path().filename().string();
+    if (entry.is_directory() == folders && !name.starts_with('.')) names.push_back(name);
   }
   std::ranges::sort(names);
   return names;

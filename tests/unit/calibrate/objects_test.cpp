@@ -114,6 +114,9 @@ TEST_F(Evaluate, SaysBothSplitsAndDrawsTheTable) {
   write_map("presses/plate/left/1.npy", map_of(corner, 55, 45));
   write_map("presses/plate/left/2.npy", map_of(corner, 63, 47));
   write_map("presses/plate/right/1.npy", map_of(corner, 70, 50));
+  // As file managers and version control leave them.
+  base::write_file_atomically(at("presses/plate/left/._1.npy"), "hidden");
+  std::filesystem::create_directory(at("presses/.git"));
   ASSERT_EQ(run({"--mm-per-px", "0.1668", "-o", at("table.png")}), 0) << said_;
   EXPECT_THAT(said_, HasSubstr("ball: 3 presses or objects\nplate: 2 presses or objects\n"));
   // Three contacts of three frames, and three maps.
