@@ -165,7 +165,10 @@ void add_clients(Families& to, const net::Overview& overview) {
   const net::Traffic& traffic = overview.traffic;
   to.gauge("dtactd_clients", "Authenticated clients.", overview.status.clients_size());
   to.counter("dtactd_connections_total", "Connections accepted.", traffic.connections);
-  to.counter("dtactd_connections_refused_total", "Of those, refused as too many.", traffic.refused);
+  to.counter("dtactd_connections_refused_total",
+             "Of those, ended before they were authenticated: too many, no or a wrong token, no "
+             "Hello, no TLS.",
+             traffic.refused);
   to.counter("dtactd_frames_encoded_total",
              "Frame messages encoded: one a frame and kind of subscription, however many clients.",
              overview.status.encoded());

@@ -32,7 +32,8 @@ constexpr const char* kPng = "reference.png";
 constexpr const char* kAccepted = "accepted.toml";
 constexpr const char* kStarts = "calibration.starts";
 constexpr const char* kRecent = "recent";
-constexpr const char* kPinned = "pinned";
+// No calibration's name has a dot.
+constexpr const char* kPinned = ".pinned";
 
 /// "17" → 17. Nothing for whatever else lies in the folder.
 std::optional<std::uint64_t> number_of(const fs::path& folder) {

@@ -97,7 +97,7 @@ class CalibrationStore {
 ///     STATE/calibration → calibrations/2/ball
 ///     STATE/calibration.starts                                    while a start is under way
 ///     STATE/calibrations/recent                                   the numbers by last use
-///     STATE/calibrations/1/pinned                                 an empty file
+///     STATE/calibrations/1/.pinned                                an empty file
 ///
 /// Without the link the configured folder is current. A number's folder is written and synced as a
 /// whole beside the others and renamed into place; then the link moves by a rename. So at

@@ -93,7 +93,7 @@ void Admission::hold(const void* client, const std::string& host, std::size_t by
   held_bytes_ += bytes;
   while (held_bytes_ > kMaxHeld) {
     const auto worst = worst_beside(client);
-    // One alone has at most Outbox::kMaxBytes and a message each way.
+    // One alone has at most Outbox::kMaxBytes, two messages to it and one from it.
     if (worst == held_.end()) return;
     const auto end = std::move(worst->second.disconnect);
     held_bytes_ -= worst->second.bytes;

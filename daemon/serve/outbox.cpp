@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <boost/asio/buffer.hpp>
 #include <utility>
 
@@ -24,7 +25,10 @@ std::string framed(const v1::ServerMessage& message) {
 }  // namespace
 
 bool Outbox::push(const v1::ServerMessage& message, bool first) {
-  if (control_count() >= kMaxMessages || control_bytes_ > kMaxBytes) return false;
+  // An answer may be as large as a message: a client that is reading it is not behind.
+  std::size_t largest = sending_control_.size();
+  for (const std::string& waiting : control_) largest = std::max(largest, waiting.size());
+  if (control_count() >= kMaxMessages || control_bytes_ - largest > kMaxBytes) return false;
   std::string bytes = framed(message);
   control_bytes_ += bytes.size();
   control_.insert(first ? control_.begin() : control_.end(), std::move(bytes));

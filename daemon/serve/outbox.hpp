@@ -19,8 +19,8 @@ namespace dtact::net {
 ///
 /// Overflow. Frames: one being sent and one waiting; a newer one takes the waiting one's place and
 /// the drop is counted. Answers and events: never dropped, sent before the waiting frame; when more
-/// than kMaxMessages or kMaxBytes of them lie unread, no more are taken. A reader that has stopped
-/// is to be spared frames: stalled().
+/// than kMaxMessages of them, or more than kMaxBytes beside the largest, lie unread, no more are
+/// taken. A reader that has stopped is to be spared frames: stalled().
 class Outbox {
  public:
   static constexpr std::size_t kMaxMessages = 1024;

@@ -232,10 +232,12 @@ void Session::on_hello(std::uint64_t id, const v1::Hello& hello) {
 
 void Session::deny(std::uint64_t id, const Admission::Verdict& verdict) {
   state_ = State::denied;
+  // Before the delay: a client that does not wait for the answer is logged, too.
+  log_refusal(verdict.sentence);
   timer_.expires_after(verdict.delay);
   timer_.async_wait(
       [self = shared_from_this(), id, sentence = verdict.sentence](const error_code& error) {
-        if (!error && self->state_ == State::denied) self->end_with(id, v1::ERROR_DENIED, sentence);
+        if (!error && self->state_ == State::denied) self->end(id, v1::ERROR_DENIED, sentence);
       });
 }
 
@@ -265,9 +267,17 @@ void Session::reply_error(std::uint64_t id, int error_code_, const std::string& 
   send(message);
 }
 
-void Session::end_with(std::uint64_t id, int error_code_, const std::string& sentence) {
+void Session::log_refusal(const std::string& sentence) {
   config_.log({LogLevel::warning, fmt::format("client {}: {}", peer().address, sentence),
                peer().address, subject(), token_name()});
+}
+
+void Session::end_with(std::uint64_t id, int error_code_, const std::string& sentence) {
+  log_refusal(sentence);
+  end(id, error_code_, sentence);
+}
+
+void Session::end(std::uint64_t id, int error_code_, const std::string& sentence) {
   reply_error(id, error_code_, sentence);
   if (state_ == State::closed) return;
   // Closing at once, with bytes unread, would reset the connection and take the answer with it: so

@@ -110,8 +110,11 @@ class Session : public std::enable_shared_from_this<Session>, private Outbox::Ow
   void on_hello(std::uint64_t id, const v1::Hello& hello);
   /// Answers after a while, so that guessing takes its time, and ends.
   void deny(std::uint64_t id, const Admission::Verdict& verdict);
-  /// Sends an error as the last answer and ends.
+  void log_refusal(const std::string& sentence);
+  /// Logs an error and sends it as the last answer.
   void end_with(std::uint64_t id, int error_code, const std::string& sentence);
+  /// Sends an error as the last answer and ends.
+  void end(std::uint64_t id, int error_code, const std::string& sentence);
   /// The subject of log lines about this client.
   [[nodiscard]] LogSubject subject() const noexcept;
   std::shared_ptr<void> hold() override { return shared_from_this(); }

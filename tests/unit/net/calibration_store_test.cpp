@@ -439,6 +439,18 @@ TEST_F(Store, SaysThatTheLinkLeadsElsewhere) {
   EXPECT_THROW((void)store.read({}), std::runtime_error);
 }
 
+// Before: its folder was taken for the mark of a pin, so none was ever removed.
+TEST_F(Store, ACalibrationOfAnyNameCanBePinned) {
+  FolderCalibrationStore store(state_, {});
+  for (int i = 1; i <= 12; ++i) store.keep({"pinned", std::to_string(i), "p"});
+  EXPECT_THAT(numbers(store.list()), ElementsAre(3, 4, 5, 6, 7, 8, 9, 10, 11, 12));
+  EXPECT_FALSE(store.list().back().pinned);
+  store.pin(12, true);
+  EXPECT_TRUE(store.list().back().pinned);
+  store.pin(12, false);
+  EXPECT_FALSE(store.list().back().pinned);
+}
+
 TEST_F(Store, FailsWhereItCannotWrite) {
   base::write_file_atomically(state_ / "no", "a file");
   FolderCalibrationStore store(state_ / "no", {});

@@ -87,6 +87,22 @@ TEST_F(Guarded, RefusesAMissingAndAWrongToken) {
   EXPECT_THAT(rig.log(), Not(HasSubstr("0123456789abcdeX")));
 }
 
+// Before: only clients that waited for the answer were logged, and one that guesses need not wait.
+TEST_F(Guarded, LogsAWrongTokenOfAClientThatLeavesAtOnce) {
+  Rig rig(config_);
+  {
+    RawClient hasty(rig.tcp_port());
+    hasty.send(message_of([](v1::ClientMessage& m) {
+      m.set_id(1);
+      m.mutable_hello()->set_major(1);
+      m.mutable_hello()->set_token("0123456789abcdeX");
+    }));
+    hasty.finish();
+    EXPECT_TRUE(hasty.ends());
+  }
+  EXPECT_TRUE(rig.wait_log("does not know the token"));
+}
+
 TEST_F(Guarded, ServesOthersWhileOneWaitsForItsRefusal) {
   const Rig rig(config_);
   RawClient wrong(rig.tcp_port());

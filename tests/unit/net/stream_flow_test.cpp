@@ -2,8 +2,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <chrono>
 #include <memory>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "tests/unit/net/raw_client.hpp"
@@ -98,13 +101,13 @@ TEST(Stream, SurvivesAClientKilledInTheMiddleOfAFrame) {
   EXPECT_EQ(other.request(get_status()).status().clients_size(), 1);
 }
 
-/// Requests a calibration of a mebibyte.
-v1::ClientMessage get_large(Rig& rig, RawClient& client) {
+/// Requests a calibration of `bytes` that was uploaded before.
+v1::ClientMessage get_large(Rig& rig, RawClient& client, std::size_t bytes) {
   v1::ClientMessage message;
   auto& upload = *message.mutable_upload_calibration();
   upload.set_name("large");
   upload.set_calibration_toml("toml");
-  upload.set_reference_png(std::string(1U << 20U, 'x'));
+  upload.set_reference_png(std::string(bytes, 'x'));
   const std::uint64_t number = client.request(message).done().calibration();
   EXPECT_EQ(number, *rig.store.current_number());
   message.mutable_get_calibration()->set_number(number);
@@ -115,7 +118,7 @@ TEST(Stream, WhatAClientHasReadIsNotUnread) {
   Rig rig({}, answer_done);
   RawClient client(rig.tcp_port());
   client.hello();
-  const auto get = get_large(rig, client);
+  const auto get = get_large(rig, client, 1U << 20U);
   for (int i = 0; i < 6; ++i) {
     ASSERT_EQ(client.request(get).calibration().reference_png().size(), 1U << 20U) << i;
   }
@@ -125,7 +128,7 @@ TEST(Stream, LetsAClientGoThatLeavesMegabytesUnread) {
   Rig rig({}, answer_done);
   RawClient deaf(rig.tcp_port(), kSmallBuffer);
   deaf.hello();
-  auto get = get_large(rig, deaf);
+  auto get = get_large(rig, deaf, 1U << 20U);
   for (std::uint64_t id = 100; id < 112; ++id) {
     get.set_id(id);
     deaf.send(get);
@@ -133,6 +136,30 @@ TEST(Stream, LetsAClientGoThatLeavesMegabytesUnread) {
   EXPECT_TRUE(rig.wait_log(" answers and events ("));
   EXPECT_THAT(rig.log(), HasSubstr("bytes) lay unread"));
   EXPECT_TRUE(deaf.ends());
+}
+
+// Before: the event ended the connection, and the answer was lost.
+TEST(Stream, KeepsAClientThatReadsALargeAnswerWhileAnEventComes) {
+  Rig rig({}, answer_done);
+  RawClient client(rig.tcp_port(), kSmallBuffer);
+  client.hello();
+  RawClient other(rig.tcp_port());
+  other.hello();
+  auto get = get_large(rig, client, 6U << 20U);
+  get.set_id(100);
+  client.send(get);
+  const auto waiting = [&] {
+    std::uint64_t most = 0;
+    for (const auto& about : other.request(get_status()).status().clients()) {
+      most = std::max(most, about.waiting_bytes());
+    }
+    return most;
+  };
+  while (waiting() < (5U << 20U)) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  rig.port.emit(pipeline::ReferenceTaken{false, {.sequence = 77}});
+  EXPECT_EQ(other.event().reference().sequence(), 77U);
+  EXPECT_EQ(client.reply().calibration().reference_png().size(), 6U << 20U);
+  EXPECT_EQ(client.event().reference().sequence(), 77U);
 }
 
 TEST(Stream, LetsAClientGoThatLeavesEventsUnread) {
