@@ -6,6 +6,12 @@
 #include <utility>
 
 namespace dtact::mcap {
+namespace {
+
+/// A map takes ten times the memory of its smallest entries' bytes.
+constexpr std::size_t kMaxEntries = 65'536;
+
+}  // namespace
 
 void put_string(std::string& out, std::string_view text) {
   put(out, static_cast<std::uint32_t>(text.size()));
@@ -46,6 +52,9 @@ std::map<std::string, std::string> Cursor::map() {
   Cursor entries(bytes(take<std::uint32_t>()), name_, begin);
   std::map<std::string, std::string> map;
   while (entries.left() > 0) {
+    if (map.size() == kMaxEntries) {
+      entries.fail(fmt::format("a map has more than {} entries", kMaxEntries));
+    }
     std::string key = entries.string();
     map[std::move(key)] = entries.string();
   }

@@ -211,11 +211,11 @@ void Reader::Impl::add(const Cursor::Record& record) {
   if (record.op == Op::schema) {
     Schema schema = take_schema(fields);
     if (schema.id == 0) return;  // invalid, and to be ignored
-    const auto [known, added] = schemas.emplace(schema.id, schema);
+    const auto [known, added] = schemas.try_emplace(schema.id, std::move(schema));
     if (!added && known->second != schema) fields.fail("two schemas have one id");
   } else if (record.op == Op::channel) {
     Channel channel = take_channel(fields);
-    const auto [known, added] = channels.emplace(channel.id, channel);
+    const auto [known, added] = channels.try_emplace(channel.id, std::move(channel));
     if (!added && known->second != channel) fields.fail("two channels have one id");
   }
 }
@@ -383,21 +383,27 @@ void Reader::read(const std::set<std::string>& topics,
   };
   for (const Place& place : impl.places) {
     std::string records;
-    std::vector<Cursor::Record> inside;
     try {
       records = place.chunk ? impl.file.load_chunk(place.offset)
                             : impl.file.load_record(place.offset, Op::message);
-      if (place.chunk) {
-        Cursor cursor = impl.file.cursor(records, place.offset);
-        while (cursor.left() > 0) inside.push_back(cursor.record());
-      } else {
-        inside.push_back({Op::message, records, place.offset});
-      }
     } catch (const Error& e) {
-      // What stands before the damage in a chunk that decompressed is read nevertheless.
       impl.chunks.add(e.what());
+      continue;
     }
-    for (const Cursor::Record& record : inside) {
+    if (!place.chunk) {
+      if (!offer({Op::message, records, place.offset})) return;
+      continue;
+    }
+    // One after another: a list of the records can be many times as large as the chunk.
+    Cursor cursor = impl.file.cursor(records, place.offset);
+    while (cursor.left() > 0) {
+      Cursor::Record record{};
+      try {
+        record = cursor.record();
+      } catch (const Error& e) {
+        impl.chunks.add(e.what());
+        break;
+      }
       if (record.op == Op::message && !offer(record)) return;
     }
   }

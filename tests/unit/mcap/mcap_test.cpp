@@ -1,8 +1,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <charconv>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <stdexcept>
@@ -442,6 +445,43 @@ TEST_F(Mcap, AnIndexThatPointsAtARecordAgainAndAgainIsLeft) {
   EXPECT_THAT(reader.damage(), HasSubstr("in the index more than once"));
   EXPECT_THAT(reader.metadata(), SizeIs(1));
 }
+
+TEST_F(Mcap, RefusesAMapOfManyEntries) {
+  std::string entries;
+  for (std::uint32_t i = 0; i < 65'537; ++i) {
+    put_string(entries, std::to_string(i));
+    put_string(entries, "");
+  }
+  std::string fields;
+  put_string(fields, "many");
+  put_string(fields, entries);
+  std::string record;
+  put_record(record, Op::metadata, fields);
+  write(file_of(record, ""));
+  const Reader reader(file());
+  EXPECT_THAT(reader.damage(), HasSubstr("a map has more than 65536 entries"));
+  EXPECT_THAT(reader.metadata(), IsEmpty());
+}
+
+#ifndef __SANITIZE_ADDRESS__  // which takes address space of its own
+// Before: a list of the chunk's records took four times its size and more.
+TEST_F(Mcap, ManySmallRecordsTakeNoMoreMemoryThanTheirChunk) {
+  constexpr std::size_t kRecords = 2'000'000;
+  std::string records;
+  for (std::size_t i = 0; i < kRecords; ++i) put_record(records, static_cast<Op>(0x70), "");
+  write(file_of(channel_of(1, "/t") + chunk_of(records + message_of(1, 7, 8)), ""));
+  const Reader reader(file());
+  const auto read_with_little = [&] {
+    std::size_t pages = 0;
+    std::ifstream("/proc/self/statm") >> pages;
+    const std::size_t bytes = pages * static_cast<std::size_t>(::sysconf(_SC_PAGESIZE));
+    const rlimit limit{bytes + 3 * records.size(), bytes + 3 * records.size()};
+    ::setrlimit(RLIMIT_AS, &limit);
+    return read(reader).size() == 1 ? 0 : 1;
+  };
+  EXPECT_EXIT(std::exit(read_with_little()), testing::ExitedWithCode(0), "");
+}
+#endif
 
 TEST_F(Mcap, RefusesLz4BySayingWhatToDo) {
   std::string bytes = from_hex(kScanned);
