@@ -7,6 +7,9 @@
 // After foreach_target.h:
 #include <hwy/highway.h>
 
+#include <iterator>
+#include <numeric>
+
 HWY_BEFORE_NAMESPACE();
 namespace dtact::recon::vec::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
@@ -173,8 +176,11 @@ CellTotals CompareCells(const CellPlanes& p, const ChangeLimits& limits) {
     }
     hn::StoreU(now, d32, p.active + i);
   }
+  // A lane's sum fits 32 bits, that of all lanes does not above 16.8 megapixels.
   const auto total = [&](V32 v) HWY_ATTR {
-    return static_cast<int64_t>(hn::GetLane(hn::SumOfLanes(d32, v)));
+    HWY_ALIGN int32_t lanes[kLanes];
+    hn::Store(v, d32, lanes);
+    return std::accumulate(std::begin(lanes), std::end(lanes), int64_t{0});
   };
   return {total(grey), total(change_sum), total(rough), total(step),
           static_cast<int>(total(active))};
