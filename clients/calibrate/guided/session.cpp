@@ -98,7 +98,7 @@ void Session::prepare_map(const v1::Status& status) {
   image::Grey16 black{width, height, {}};
   black.pixels.resize(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
   empty_ = calibration::empty_calibration(black, map.crop, map.mm_per_px, map.lens);
-  // Comes before the first image: the daemon would refuse such a map only at the upload.
+  // Comes before the first image: the daemon would refuse the map only at the upload.
   pipeline::require_coverage(empty_.model->rectify, folder_.calibration_name());
   grid_ = CellGrid(recon::region_read(empty_.model->rectify));
   cell_mm_ = grid_.cell_px() * (map.lens ? recon::central_mm_per_px(*map.lens) : map.mm_per_px);

@@ -302,7 +302,7 @@ calibration::Calibration build_lut(const PressImages& images, FitMethod method,
 
 void save_or_refuse(const calibration::Calibration& made, const std::vector<std::string>& doubts,
                     bool force, const std::string& folder, const std::string& hint) {
-  // Comes before the doubts: the daemon refuses such a map even where --force has written it.
+  // Comes before the doubts: the daemon refuses the map even where --force has written it.
   pipeline::require_coverage(made.model->rectify, folder);
   if (!doubts.empty() && !force) {
     throw std::runtime_error(fmt::format("{}{}; nothing was written (--force writes it as it is)",

@@ -54,7 +54,7 @@ TEST(TokenBucket, KeepsAReserve) {
   EXPECT_TRUE(bucket.take(1, 4, start + milliseconds(500)));
 }
 
-// Before: such a request was refused for ever.
+// Before: the request was refused for ever.
 TEST(TokenBucket, WhatCostsMoreThanThereCanBeTakesAll) {
   const TokenBucket::Clock::time_point start;
   TokenBucket bucket(10, 5, start);

@@ -43,7 +43,7 @@ TEST_P(Cells, TotalsOfALargeFrameDoNotOverflow) {
                                            .active = active.data() + kBeyond},
                                           {});
   EXPECT_EQ(totals.grey, std::int64_t{kColumns} * kRows * kWhite);
-  EXPECT_EQ(totals.step, std::int64_t{kColumns} * kRows * kWhite);
+  EXPECT_EQ(totals.quiet_step, std::int64_t{kColumns} * kRows * kWhite);
 }
 
 DTACT_EVERY_TARGET(Cells);
