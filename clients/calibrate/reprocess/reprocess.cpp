@@ -148,15 +148,32 @@ class Reprocessor {
     return calibration_->model->rectify.frame_height / frame_scale_;
   }
 
-  /// The daemon's when the recording began. It lies behind the first frame, whose depth needs it.
+  /// Reads the daemon's status at the beginning of the recording. Recorders write it behind the
+  /// first frame, whose depth needs it. The light that it followed counts only for the reference
+  /// of that time.
   void find_status() {
+    std::optional<mcap::AttachmentPlace> reference;  // that of the first frame
+    bool retaken = false;                            // after the status, which is older
     recording::RecordingHandlers handlers;
-    handlers.status = [this](const v1::Status& status, std::uint64_t) {
-      status_ = status;
-      status_->clear_calibration();  // that of the depth before
-      return false;
+    handlers.frame = [&](const v1::Frame&, std::uint64_t time) {
+      if (!reference) {
+        reference = recording::find_attachment(file_, recording::kCurrentReferencePng, time);
+      }
+      return reference ? time <= reference->log_time : !status_;
+    };
+    handlers.event = [&](const v1::Event& event, std::uint64_t time) {
+      retaken |= event.has_reference() && (!reference || time <= reference->log_time);
+      return true;
+    };
+    handlers.status = [&](const v1::Status& status, std::uint64_t) {
+      if (!status_) status_ = status;
+      return true;
     };
     recording::read_recording(file_, handlers);
+    if (!status_) return;
+    status_->clear_calibration();  // that of the depth before
+    // The output holds the value that was used, so that it can be reprocessed in turn.
+    if (!reference || retaken) status_->clear_light_followed();
   }
 
   bool decode(const v1::Frame& frame) {
@@ -211,7 +228,10 @@ class Reprocessor {
     const auto place = recording::find_attachment(file_, recording::kCurrentReferencePng, time);
     if (!place || place->offset == reference_at_) return;
     const bool first = std::exchange(reference_at_, place->offset) == 0;
-    reference_png_ = file_.attachment(*place).data;
+    std::string png = file_.attachment(*place).data;
+    // Recorders attach it again after another calibration, and its light is still followed.
+    if (png == reference_png_) return;
+    reference_png_ = std::move(png);
     const image::Grey16 image =
         image::decode_png_grey16(reference_png_, recording::kCurrentReferencePng);
     if (image.width != frame_width() || image.height != frame_height()) {
@@ -275,9 +295,9 @@ class Reprocessor {
   hal::luma::LumaBuffer luma_;
   mcap::FileSink sink_;
   recording::RecordingWriter writer_;
-  std::string reference_png_;       // the PNG of the reference in use
-  std::uint64_t reference_at_ = 0;  // its place in the file
-  std::optional<v1::Status> status_;
+  std::string reference_png_;         // the PNG of the reference in use
+  std::uint64_t reference_at_ = 0;    // its place in the file
+  std::optional<v1::Status> status_;  // see find_status()
   bool attach_due_ = false;
   std::uint64_t frames_ = 0;
   std::uint64_t maps_ = 0;
