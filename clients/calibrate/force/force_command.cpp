@@ -47,7 +47,7 @@ std::vector<Pair> measured(const Options& options, const calibration::Calibratio
       throw std::runtime_error("--reference has not the size of the calibration's frame");
     }
   }
-  const ContactReader reader(calibration, reference);
+  const ContactReader reader(calibration, reference, options.calibration);
   std::vector<Pair> pairs;
   for (const Reading& reading : readings) {
     pairs.push_back(reader.measure(reading.frames));

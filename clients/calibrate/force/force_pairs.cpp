@@ -65,7 +65,8 @@ bool same_depth(const recon::Model& a, const recon::Model& b) {
 }
 
 void require_same_calibration(const mcap::Reader& file, const std::string& path,
-                              const calibration::Calibration& calibration) {
+                              const calibration::Calibration& calibration,
+                              const std::string& folder) {
   const auto toml = recording::find_attachment(file, recording::kCalibrationToml);
   const auto png = recording::find_attachment(file, recording::kReferencePng);
   if (toml && png) {
@@ -74,9 +75,9 @@ void require_same_calibration(const mcap::Reader& file, const std::string& path,
     if (same_depth(*recorded.model, *calibration.model)) return;
   }
   throw std::runtime_error(fmt::format(
-      "{} was not measured with the calibration {}: dtact-calibrate reprocess {} --calibration "
-      "FOLDER -o NEW.mcap, with the folder of that calibration, makes its depth anew",
-      path, calibration.name, path));
+      "{} was not measured with the calibration {}: dtact-calibrate reprocess {} --calibration {} "
+      "-o {}-anew.mcap makes its depth anew",
+      path, calibration.name, path, folder, path.substr(0, path.size() - kRecording.size())));
 }
 
 [[noreturn]] void fail_beyond(const std::string& name) {
@@ -204,7 +205,7 @@ Pair ContactReader::measure(std::span<const image::Grey8> frames, const std::str
 Pair ContactReader::measure_recording(const std::string& path, std::uint64_t first,
                                       std::uint64_t end) const {
   const mcap::Reader file(path);
-  require_same_calibration(file, path, calibration_);
+  require_same_calibration(file, path, calibration_, folder_);
   MeanMap mean;
   v1::DepthMap map;
   std::uint64_t at = 0;

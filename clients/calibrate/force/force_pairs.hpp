@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "clients/calibrate/force/force_fit.hpp"
@@ -29,10 +30,11 @@ struct Reading {
 /// The contacts of frames, averaged over each reading's frames.
 class ContactReader {
  public:
-  /// Pictures are measured against `reference_q8`, the reference image in their light.
+  /// Pictures are measured against `reference_q8`, the reference image in their light. Errors name
+  /// `folder`, the path that the calibration was loaded from.
   ContactReader(const calibration::Calibration& calibration,
-                std::span<const std::uint16_t> reference_q8)
-      : calibration_(calibration), reference_q8_(reference_q8) {}
+                std::span<const std::uint16_t> reference_q8, std::string folder)
+      : calibration_(calibration), reference_q8_(reference_q8), folder_(std::move(folder)) {}
 
   /// The reading itself is left to the caller. A recording's maps are those that the daemon
   /// measured. Throws std::runtime_error when the frames cannot be read, are of another size or,
@@ -47,6 +49,7 @@ class ContactReader {
 
   const calibration::Calibration& calibration_;
   std::span<const std::uint16_t> reference_q8_;
+  std::string folder_;
 };
 
 }  // namespace dtact::force

@@ -56,7 +56,7 @@ class Force : public testing::Test {
   /// Eight presses of 0.5 to 1.4 mm; the scale shows the force of a gel of 2 mm and 0.15 MPa.
   [[nodiscard]] std::string readings(double factor = 1) const {
     const calibration::Calibration cal = calibration::load(at("cal"));
-    const ContactReader reader(cal, cal.model->reference_q8);
+    const ContactReader reader(cal, cal.model->reference_q8, at("cal"));
     std::string csv = "frames,force\n# from light to heavy\n";
     for (const double depth : {0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.2, 1.4}) {
       const std::string name = fmt::format("press{}.png", std::lround(depth * 10));
@@ -86,7 +86,7 @@ double volume_mm3(const recon::CellMap& cells) {
 TEST_F(Force, ReadsAPictureAsTheDaemonDoes) {
   const calibration::Calibration cal = calibration::load(at("cal"));
   write("press.png", Ball{.depth_mm = 1.0}.frame());
-  const ContactReader reader(cal, cal.model->reference_q8);
+  const ContactReader reader(cal, cal.model->reference_q8, at("cal"));
   // The cap of 1 mm: π h² (R − h / 3).
   EXPECT_NEAR(volume_mm3(reader.measure(at("press.png")).contact), 11.5, 0.6);
   write("current_reference.png", Ball{}.reference_image());
@@ -96,7 +96,7 @@ TEST_F(Force, ReadsAPictureAsTheDaemonDoes) {
 // Only the end of a name makes it a recording.
 TEST_F(Force, ReadsAPictureBelowAFolderThatIsNamedLikeARecording) {
   const calibration::Calibration cal = calibration::load(at("cal"));
-  const ContactReader reader(cal, cal.model->reference_q8);
+  const ContactReader reader(cal, cal.model->reference_q8, at("cal"));
   for (const char* folder : {"press.mcap", "press.mcap.pictures"}) {
     std::filesystem::create_directory(at(folder));
     const std::string name = std::string(folder) + "/press.png";
@@ -187,7 +187,7 @@ class ForceOfARecording : public Force {
 
 TEST_F(ForceOfARecording, TakesWhatTheDaemonMeasured) {
   const calibration::Calibration cal = calibration::load(at("cal"));
-  const ContactReader reader(cal, cal.model->reference_q8);
+  const ContactReader reader(cal, cal.model->reference_q8, at("cal"));
   const std::string file = recording("cal");
   const auto deepest = [&](const std::string& frames) {
     return std::ranges::max(reader.measure(file + frames).contact.mm());
@@ -210,7 +210,9 @@ TEST_F(ForceOfARecording, RefusesThatOfAnotherCalibration) {
                  "--radius-mm", "4.0", "--mm-per-px", "0.051", "-o", at("other")}),
             0);
   EXPECT_EQ(run({"force", "--calibration", at("other"), "--pair", file + "@0.5"}), 1);
-  EXPECT_THAT(said_, HasSubstr("dtact-calibrate reprocess"));
+  // The command can be copied from the message.
+  EXPECT_THAT(said_, HasSubstr("dtact-calibrate reprocess " + file + " --calibration " +
+                               at("other") + " -o " + at("press-anew.mcap") + " "));
 }
 
 TEST_F(Force, ReadsItsInputStrictly) {
