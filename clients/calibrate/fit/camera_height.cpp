@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <stdexcept>
 #include <vector>
 
 #include "clients/calibrate/fit/least_squares.hpp"
@@ -33,24 +32,19 @@ std::vector<SeenPress> look(const BallPresses& set, const Calibration& empty) {
   recon::Model model = *empty.model;
   model.surface.view = {};
   std::vector<SeenPress> presses;
-  for (const BallPresses::Press& press : set.presses) {
-    try {
-      const SettledPress settled =
-          settle(model, set.reference_q8.pixels, press.frames, set.ball_radius_mm);
-      const Contact& contact = settled.contact;
-      const DarkeningMap& map = settled.map;
-      SeenPress seen{sure_samples(map, contact),
-                     contact,
-                     {(contact.col - 0.5 * (map.width - 1)) * map.mm_per_px,
-                      (contact.row - 0.5 * (map.height - 1)) * map.mm_per_px}};
-      for (PressSample& sample : seen.samples) {
-        sample.x_mm += seen.centre_mm.x;
-        sample.y_mm += seen.centre_mm.y;
-      }
-      presses.push_back(std::move(seen));
-    } catch (const std::runtime_error&) {
-      continue;  // build() names it
+  const UsablePresses usable = settle_each(model, set);  // build() names those left out
+  for (const SettledPress& settled : usable.presses) {
+    const Contact& contact = settled.contact;
+    const DarkeningMap& map = settled.map;
+    SeenPress seen{sure_samples(map, contact),
+                   contact,
+                   {(contact.col - 0.5 * (map.width - 1)) * map.mm_per_px,
+                    (contact.row - 0.5 * (map.height - 1)) * map.mm_per_px}};
+    for (PressSample& sample : seen.samples) {
+      sample.x_mm += seen.centre_mm.x;
+      sample.y_mm += seen.centre_mm.y;
     }
+    presses.push_back(std::move(seen));
   }
   return presses;
 }

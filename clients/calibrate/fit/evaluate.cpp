@@ -166,7 +166,7 @@ Evaluation read(const recon::Model& model, const SettledPress& press,
   return result;
 }
 
-/// A press's contact and the mean light there; nothing without contact.
+/// A usable press's contact and the mean light there.
 struct LitContact {
   Contact contact;
   double light = 0;
@@ -174,24 +174,18 @@ struct LitContact {
 std::vector<LitContact> lit_contacts(const recon::Model& model, const BallPresses& set,
                                      const image::Grey8& light) {
   std::vector<LitContact> found;
-  for (const BallPresses::Press& press : set.presses) {
-    try {
-      const SettledPress settled =
-          settle(model, set.reference_q8.pixels, press.frames, set.ball_radius_mm);
-      double sum = 0;
-      double pixels = 0;
-      for (int y = 0, i = 0; y < light.height; ++y) {
-        for (int x = 0; x < light.width; ++x, ++i) {
-          if (distance_mm(settled.map, settled.contact, x, y) >= settled.contact.radius_mm)
-            continue;
-          sum += light.pixels[static_cast<std::size_t>(i)];
-          pixels += 1;
-        }
+  const UsablePresses usable = settle_each(model, set);  // build() has named those left out
+  for (const SettledPress& press : usable.presses) {
+    double sum = 0;
+    double pixels = 0;
+    for (int y = 0, i = 0; y < light.height; ++y) {
+      for (int x = 0; x < light.width; ++x, ++i) {
+        if (distance_mm(press.map, press.contact, x, y) >= press.contact.radius_mm) continue;
+        sum += light.pixels[static_cast<std::size_t>(i)];
+        pixels += 1;
       }
-      if (pixels > 0) found.push_back({settled.contact, sum / pixels});
-    } catch (const std::runtime_error&) {
-      continue;  // no contact; build() has reported the reason
     }
+    if (pixels > 0) found.push_back({press.contact, sum / pixels});
   }
   return found;
 }

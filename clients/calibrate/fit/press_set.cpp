@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <memory>
 #include <stdexcept>
@@ -26,33 +27,25 @@ std::string name_left_out(const std::vector<std::string>& left_out) {
   return left_out.empty() ? "" : fmt::format("; left out: {}", fmt::join(left_out, "; "));
 }
 
-/// The presses with a contact; the others' reasons go to `left_out`.
+/// The usable presses, which alone stay in `set`; the others' reasons go to `left_out`.
 std::vector<SettledPress> settle_all(const recon::Model& model, BallPresses& set,
                                      std::vector<std::string>& left_out) {
-  std::vector<SettledPress> presses;
+  UsablePresses usable = settle_each(model, set);
+  std::ranges::move(usable.left_out, std::back_inserter(left_out));
   std::vector<BallPresses::Press> used;
-  for (BallPresses::Press& press : set.presses) {
-    try {
-      presses.push_back(
-          settle_unclipped(model, set.reference_q8, press.frames, set.ball_radius_mm));
-      used.push_back(std::move(press));
-    } catch (const std::runtime_error& e) {
-      left_out.push_back(fmt::format("{}: {}", press.name, e.what()));
-    }
-  }
+  for (const std::size_t p : usable.indices) used.push_back(std::move(set.presses[p]));
   set.presses = std::move(used);
-  if (presses.size() < 2) {
+  if (usable.presses.size() < 2) {
     throw std::runtime_error(
         fmt::format("a chain of presses needs at least two in which a contact is found: press "
                     "lighter and deeper{}",
                     name_left_out(left_out)));
   }
-  return presses;
+  return std::move(usable.presses);
 }
 
-/// Why as a share of the light the presses make no chain, with the press's name; empty: they do.
-/// In dark parts a few grey levels are a large share of the light, and a faint press in a bright
-/// part may be none.
+/// Why the presses make no chain as a share of the light; empty: they do. In dark parts a few grey
+/// levels are a large share of the light, and in bright parts a faint press is too small a share.
 std::string lost_to_the_share(const recon::Model& uniform, const BallPresses& set,
                               const std::vector<SettledPress>& seen) {
   std::size_t found = 0;
@@ -248,6 +241,21 @@ void refuse_gaps(const ChainFit& chain, const BallPresses& set,
 }
 
 }  // namespace
+
+UsablePresses settle_each(const recon::Model& model, const BallPresses& set) {
+  UsablePresses usable;
+  for (std::size_t p = 0; p < set.presses.size(); ++p) {
+    const BallPresses::Press& press = set.presses[p];
+    try {
+      usable.presses.push_back(
+          settle_unclipped(model, set.reference_q8, press.frames, set.ball_radius_mm));
+      usable.indices.push_back(p);
+    } catch (const std::runtime_error& e) {
+      usable.left_out.push_back(fmt::format("{}: {}", press.name, e.what()));
+    }
+  }
+  return usable;
+}
 
 Calibration build(const BallPresses& presses, PressReport* report) {
   check_sizes(presses.ball_radius_mm, presses.mm_per_px);

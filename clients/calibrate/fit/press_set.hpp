@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <optional>
 #include <string>
 #include <vector>
@@ -26,6 +27,16 @@ struct BallPresses {
   /// the light either.
   bool gain_specified = false;
 };
+
+/// The presses of a set that can be used to calibrate.
+struct UsablePresses {
+  std::vector<SettledPress> presses;
+  std::vector<std::size_t> indices;   ///< Of each in BallPresses::presses.
+  std::vector<std::string> left_out;  ///< The others: name and reason.
+};
+
+/// settle_unclipped() of every press. Those for which it throws std::runtime_error are left out.
+[[nodiscard]] UsablePresses settle_each(const recon::Model& model, const BallPresses& set);
 
 /// Findings of build().
 struct PressReport {
@@ -56,13 +67,13 @@ struct PressReport {
 /// none, a share of the light at its place, either with a plane, either with a quadratic. Each is
 /// judged by its prediction of presses that LUT and gain were made without (leave_one_out());
 /// the simplest within one standard error of the best is chosen. The share is not tried where it
-/// finds a press at another position.
+/// finds a press at another position, or fewer than two presses at all.
 ///
 /// The stated uncertainty sums, in squares, that error of the chosen gain, the LUT's change
 /// with the presses that make it, 5 % of the depth for objects of another shape, and the influence
 /// of the bright ring's light (ring_uncertainty_mm()). The caller fills `origin`.
 ///
-/// A press without a usable contact (too light, beyond the map) is left out. Throws
+/// A press without a usable contact (too light, beyond the map, white or black) is left out. Throws
 /// std::runtime_error when fewer than two remain, naming those left out, and when the presses leave
 /// a gap that no press of known depth closes, naming the missing press and those left
 /// out. Needs at least two presses.

@@ -79,19 +79,6 @@ void add_press(const image::Grey8& reference, const image::Grey8& ball, const st
   }
 }
 
-/// The presses in which find_contact() finds a contact; the published circle needs less.
-std::vector<SettledPress> settle_all(const recon::Model& model, const BallPresses& set) {
-  std::vector<SettledPress> presses;
-  for (const BallPresses::Press& press : set.presses) {
-    try {
-      presses.push_back(settle(model, set.reference_q8.pixels, press.frames, set.ball_radius_mm));
-    } catch (const std::runtime_error&) {
-      continue;
-    }
-  }
-  return presses;
-}
-
 }  // namespace
 
 Calibration build_regression(const BallPresses& set, double centre_x_mm, double centre_y_mm) {
@@ -135,7 +122,8 @@ Calibration build_regression(const BallPresses& set, double centre_x_mm, double 
         std::min(16383L, std::lround(1000 * b * q6 / recon::kEntriesPerLevel))));
   }
   model->lut.covered_to_q6 = kLastLevel * recon::kEntriesPerLevel;
-  model->uncertainty = uncertainty_of_zero(model->lut, settle_all(*model, set));
+  // The published circle needs less than a usable contact, so some presses may be missing here.
+  model->uncertainty = uncertainty_of_zero(model->lut, settle_each(*model, set).presses);
   calibration.model = std::move(model);
   return calibration;
 }

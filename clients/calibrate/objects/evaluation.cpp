@@ -39,7 +39,8 @@ using Samples = std::vector<Sample>;
   throw std::runtime_error(path.string() + ": " + sentence);
 }
 
-/// Sorted; without hidden ones.
+/// The sorted names of files or folders, without the hidden ones that file managers and version
+/// control leave.
 Names entries(const fs::path& folder, bool folders) {
   if (!fs::is_directory(folder)) refuse(folder, "there is no such folder");
   Names names;

@@ -89,7 +89,12 @@ recon::DepthLut rough_lut(const calibration::BallPresses& set, const recon::Flat
     return calibration::build_from_sphere(set, gain, unused).model->lut;
   } catch (const std::runtime_error&) {
     if (method == FitMethod::alone) throw;
-    return calibration::build_model(set, gain).calibration.model->lut;
+    try {
+      return calibration::build_model(set, gain).calibration.model->lut;
+    } catch (const std::runtime_error&) {
+      if (method == FitMethod::model) throw;
+    }
+    throw;  // the sphere's reason names the press that is missing
   }
 }
 

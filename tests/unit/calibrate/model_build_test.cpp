@@ -1,9 +1,13 @@
 // Calibrations by the gel's model from images that the model itself computes.
 #include "clients/calibrate/fit/model/model_build.hpp"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <stdexcept>
 #include <vector>
 
 #include "tests/unit/calibrate/predicted_press.hpp"
@@ -80,6 +84,23 @@ TEST(ModelBuild, AGainStaysAtItsPlaceOnTheSurface) {
   ImaginedView beside = view;
   beside.col = 210;
   EXPECT_NEAR(deepest_mm(made.calibration, beside), deepest_mm(made.calibration, view), 0.02);
+}
+
+TEST(ModelBuild, RefusesWhatIsWhiteOrBlack) {
+  using testing::HasSubstr;
+  using testing::ThrowsMessage;
+  const BallPresses set = presses_of({});
+  BallPresses white = set;  // of a light of 260 levels
+  std::ranges::fill(white.reference_q8.pixels, std::uint16_t{255 * 256});
+  for (auto& pixel : white.presses[0].frames[0].pixels) {
+    pixel = static_cast<std::uint8_t>(std::min(255, pixel + 100));
+  }
+  EXPECT_THAT([&] { (void)build_model(white); },
+              ThrowsMessage<std::runtime_error>(HasSubstr("ball: the reference is white")));
+  BallPresses black = set;
+  for (auto& pixel : black.presses[0].frames[0].pixels) pixel = pixel < 140 ? 0 : pixel;
+  EXPECT_THAT([&] { (void)build_model(black); },
+              ThrowsMessage<std::runtime_error>(HasSubstr("image is black at the contact")));
 }
 
 }  // namespace

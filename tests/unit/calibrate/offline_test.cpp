@@ -310,6 +310,21 @@ TEST_F(Offline, RefusesAPressThatIsGivenTwice) {
   EXPECT_EQ(images.set.presses.size(), 2U);
 }
 
+TEST_F(Offline, RefusesMeasuredDepthsThatAMethodDoesNotUse) {
+  write("light.png", Ball{.depth_mm = 0.5}.frame());
+  for (const std::string method : {"model", "regression"}) {
+    EXPECT_THAT(
+        [&] {
+          run({"depth", "--reference", at("reference.png"), "--press", at("ball.png") + "@1.5",
+               "--press", at("light.png"), "--radius-mm", "4.0", "--mm-per-px", "0.05", "--method",
+               method, "-o", at("cal")});
+        },
+        ThrowsMessage<std::runtime_error>(
+            HasSubstr("--method " + method + " does not use measured depths")));
+  }
+  EXPECT_FALSE(fs::exists(at("cal")));
+}
+
 TEST(DepthFile, NpyIsLittleEndianFloats) {
   const std::vector<float> mm{0.0F, 1.5F, -0.25F, std::numeric_limits<float>::quiet_NaN()};
   const std::string npy = cli::encode_npy({2, 2, 0.05, mm});
@@ -434,6 +449,42 @@ TEST(BuildLut, PressesShowTheCamerasHeight) {
   images.set.view.source = calibration::HeightSource::assumed;
   images.set.presses.resize(3);
   EXPECT_EQ(calibration::view_of_presses(images.set), images.set.view);
+}
+
+// The board's grey levels need a LUT to become a height, and these presses alone make none.
+TEST(BuildLut, AGelMakesUpForAPressWithTheLensOfABoard) {
+  PressImages images{.set = SimulatedPresses({{0.4, -0.3, 1.3}, {-4.4, 4.2, 1.1}}, 20).set(),
+                     .gain = {},
+                     .origin = {}};
+  images.set.view = {.foot_mm = {},
+                     .source = calibration::HeightSource::board,
+                     .per_mm = 0,
+                     .per_level = 0.0015,
+                     .error = 0.0001};
+  for (const FitMethod method : {FitMethod::automatic, FitMethod::model}) {
+    EXPECT_EQ(build_lut(images, method, nullptr).view.source, calibration::HeightSource::board);
+  }
+  EXPECT_THAT([&] { (void)build_lut(images, FitMethod::alone, nullptr); },
+              ThrowsMessage<std::runtime_error>(HasSubstr("no press shows")));
+}
+
+TEST(BuildLut, NamesTheMissingPressWhereNoGelMakesUpForIt) {
+  // No gel has a ring like that of these pictures.
+  const Ball deep{.depth_mm = 1.5};
+  PressImages images{.set = {}, .gain = {}, .origin = {}};
+  images.set.reference_q8 = deep.reference_image_q8();
+  images.set.presses = {
+      {.name = "deep", .frames = {deep.frame()}, .depth_mm = {}},
+      {.name = "other", .frames = {Ball{.depth_mm = 1.4}.frame()}, .depth_mm = {}}};
+  images.set.ball_radius_mm = 4;
+  images.set.mm_per_px = 0.05;
+  images.set.view = {.foot_mm = {},
+                     .source = calibration::HeightSource::board,
+                     .per_mm = 0,
+                     .per_level = 0.0015,
+                     .error = 0.0001};
+  EXPECT_THAT([&] { (void)build_lut(images, FitMethod::automatic, nullptr); },
+              ThrowsMessage<std::runtime_error>(HasSubstr("no press shows")));
 }
 
 // CropIsAboutTheCentre's crop in a larger frame: 6 of the daemon's 40 columns and of its 30 rows

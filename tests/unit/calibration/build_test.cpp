@@ -209,6 +209,15 @@ TEST(Build, SaysWhatIsWrongWithTheImages) {
       "black");
 }
 
+// As --radius-mm and --mm-per-px name them.
+TEST(CheckSizes, TheLimitsAreAllowed) {
+  for (const double radius_mm : {0.1, 100.0}) EXPECT_NO_THROW(check_sizes(radius_mm, 0.05));
+  for (const double radius_mm : {0.09, 100.1}) {
+    EXPECT_THROW(check_sizes(radius_mm, 0.05), std::invalid_argument) << radius_mm;
+  }
+  for (const double mm_per_px : {0.001, 1.0}) EXPECT_NO_THROW(check_sizes(4, mm_per_px));
+}
+
 TEST(Evaluate, RefusesAnotherSize) {
   const Calibration made = build(press_of(Ball{}));
   const Ball wide{.width = 300};

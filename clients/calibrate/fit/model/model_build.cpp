@@ -58,33 +58,12 @@ double lopsided(std::span<const SettledPress> presses) {
   return std::sqrt(sum / count);
 }
 
-/// The presses with a contact, and the names of the others with reasons.
-struct UsablePresses {
-  std::vector<SettledPress> presses;
-  std::vector<std::string> names;
-  std::vector<std::string> left_out;
-};
-
-UsablePresses look(const recon::Model& model, const BallPresses& set) {
-  UsablePresses seen;
-  for (const BallPresses::Press& press : set.presses) {
-    try {
-      seen.presses.push_back(
-          settle_unclipped(model, set.reference_q8, press.frames, set.ball_radius_mm));
-      seen.names.push_back(press.name);
-    } catch (const std::runtime_error& e) {
-      seen.left_out.push_back(fmt::format("{}: {}", press.name, e.what()));
-    }
-  }
-  return seen;
-}
-
 /// A press is found at two positions: a dark part passes as the ball.
 bool disagree(const UsablePresses& seen, const UsablePresses& shares, double mm_per_px) {
-  for (std::size_t i = 0; i < seen.names.size(); ++i) {
-    const auto same = std::ranges::find(shares.names, seen.names[i]);
-    if (same == shares.names.end()) continue;
-    const auto at = static_cast<std::size_t>(same - shares.names.begin());
+  for (std::size_t i = 0; i < seen.indices.size(); ++i) {
+    const auto same = std::ranges::find(shares.indices, seen.indices[i]);
+    if (same == shares.indices.end()) continue;
+    const auto at = static_cast<std::size_t>(same - shares.indices.begin());
     if (!same_place(seen.presses[i].contact, shares.presses[at].contact, mm_per_px)) return true;
   }
   return false;
@@ -155,13 +134,13 @@ FittedCalibration build_model(const BallPresses& set, const recon::FlatFieldGain
       empty_calibration(set.reference_q8, set.crop, set.mm_per_px, set.lens, set.view);
   auto model = std::make_shared<recon::Model>(*made.calibration.model);
   model->gain = gain_on_map(gain, made.calibration);
-  UsablePresses seen = look(*model, set);
+  UsablePresses seen = settle_each(*model, set);
   if (!set.gain_specified && gain.shape == recon::GainShape::none && gain.polynomial.empty()) {
     // The loss is a share of the light. Rings do not show whether a sensor's picture is one, but
     // where it is not, a share of uneven light makes a round dent asymmetric.
     recon::Model uniform = *model;
     uniform.gain.shape = recon::GainShape::uniform;
-    UsablePresses shares = look(uniform, set);
+    UsablePresses shares = settle_each(uniform, set);
     if (shares.presses.size() >= seen.presses.size() && !shares.presses.empty() &&
         !disagree(seen, shares, set.mm_per_px) &&
         (seen.presses.empty() || lopsided(seen.presses) > kRounder * lopsided(shares.presses))) {
@@ -193,8 +172,8 @@ FittedCalibration build_model(const BallPresses& set, const recon::FlatFieldGain
     made.fit = fit_model(profiles, made.fit);
     refuse(made);
   }
-  for (std::size_t i = 0; i < seen.names.size(); ++i) {
-    made.presses.push_back({seen.names[i], made.fit.presses[i].depth_mm});
+  for (std::size_t i = 0; i < seen.indices.size(); ++i) {
+    made.presses.push_back({set.presses[seen.indices[i]].name, made.fit.presses[i].depth_mm});
   }
 
   model->scattering = made.fit.gel.scattering;
