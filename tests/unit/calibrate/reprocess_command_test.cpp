@@ -123,7 +123,7 @@ class Reprocess : public testing::Test {
     return all;
   }
 
-  /// That b.mcap, made of a.mcap, and c.mcap, made of b.mcap, hold zero depth in so many maps, and
+  /// That b.mcap, made of a.mcap, and c.mcap, made of b.mcap, hold `maps` maps of zero depth, and
   /// one status with this light.
   void expect_zero(std::size_t maps, double followed) {
     ASSERT_EQ(run("b.mcap", "c.mcap"), 0) << said_;

@@ -150,7 +150,8 @@ TEST(Stream, KeepsAClientThatReadsALargeAnswerWhileAnEventComes) {
   client.send(get);
   const auto waiting = [&] {
     std::uint64_t most = 0;
-    for (const auto& about : other.request(get_status()).status().clients()) {
+    const v1::Reply reply = other.request(get_status());
+    for (const auto& about : reply.status().clients()) {
       most = std::max(most, about.waiting_bytes());
     }
     return most;
