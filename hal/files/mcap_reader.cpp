@@ -211,11 +211,11 @@ void Reader::Impl::add(const Cursor::Record& record) {
   if (record.op == Op::schema) {
     Schema schema = take_schema(fields);
     if (schema.id == 0) return;  // invalid, and to be ignored
-    const auto [known, added] = schemas.try_emplace(schema.id, std::move(schema));
+    const auto [known, added] = schemas.emplace(schema.id, schema);
     if (!added && known->second != schema) fields.fail("two schemas have one id");
   } else if (record.op == Op::channel) {
     Channel channel = take_channel(fields);
-    const auto [known, added] = channels.try_emplace(channel.id, std::move(channel));
+    const auto [known, added] = channels.emplace(channel.id, channel);
     if (!added && known->second != channel) fields.fail("two channels have one id");
   }
 }

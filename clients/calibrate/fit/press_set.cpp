@@ -33,6 +33,7 @@ std::vector<SettledPress> settle_all(const recon::Model& model, BallPresses& set
   UsablePresses usable = settle_each(model, set);
   std::ranges::move(usable.left_out, std::back_inserter(left_out));
   std::vector<BallPresses::Press> used;
+  used.reserve(usable.indices.size());
   for (const std::size_t p : usable.indices) used.push_back(std::move(set.presses[p]));
   set.presses = std::move(used);
   if (usable.presses.size() < 2) {
