@@ -300,15 +300,12 @@ std::vector<std::string> doubts_about(const Calibration& made, const BallPress& 
 
 std::vector<std::string> doubts_about(const Calibration& made, const BallPresses& set) {
   std::vector<std::string> doubts = doubts_about(made.model->lut);
-  for (const BallPresses::Press& press : set.presses) {
-    try {
-      const Evaluation read =
-          read_ball(made, set.reference_q8.pixels, press.frames, set.ball_radius_mm);
-      for (const std::string& doubt : doubts_about(read)) {
-        doubts.push_back(fmt::format("{}: {}", press.name, doubt));
-      }
-    } catch (const std::runtime_error&) {
-      continue;  // no contact; build() has reported the reason
+  const UsablePresses usable = settle_each(*made.model, set);  // build() has named those left out
+  for (std::size_t i = 0; i < usable.presses.size(); ++i) {
+    const BallPresses::Press& press = set.presses[usable.indices[i]];
+    for (const std::string& doubt :
+         doubts_about(read(*made.model, usable.presses[i], press.frames))) {
+      doubts.push_back(fmt::format("{}: {}", press.name, doubt));
     }
   }
   return doubts;

@@ -277,8 +277,8 @@ void Session::take_press(const std::string& name) {
   view_.set_prompt({});
   calibration::Contact contact;
   try {
-    contact = calibration::settle(*empty_.model, images_.set.reference_q8.pixels, still.frames,
-                                  plan_.ball_radius_mm)
+    contact = calibration::settle_unclipped(*empty_.model, images_.set.reference_q8, still.frames,
+                                            plan_.ball_radius_mm)
                   .contact;
   } catch (const std::runtime_error& e) {
     console_.say(fmt::format("not taken: {}", e.what()));

@@ -265,6 +265,21 @@ TEST_F(GuidedSession, ARefusedPressIsNotTakenAlready) {
   EXPECT_NE(console.said.find(refused), console.said.rfind(refused)) << console.said;
 }
 
+// Before: it was taken, and left out of the LUT at the end.
+TEST_F(GuidedSession, APressThatIsBlackIsRefused) {
+  FakeSensor sensor({kContactFree, {.depth_mm = 1.0}});
+  sensor.paint = [](const Scene& scene) {
+    v1::LumaMap map = test::picture(scene, scene.depth_mm, 1);
+    for (char& pixel : *map.mutable_data()) {
+      if (static_cast<unsigned char>(pixel) < 190) pixel = 0;
+    }
+    return map;
+  };
+  FakeConsole console({"", "", "q"});
+  EXPECT_EQ(run(sensor, console), Outcome::unfinished) << console.said;
+  EXPECT_THAT(console.said, HasSubstr("not taken: the ball's image is black at the contact"));
+}
+
 TEST_F(GuidedSession, ATooLightPressIsRefusedAndNotKept) {
   FakeSensor sensor(presses({{.depth_mm = 0.22}}));
   FakeConsole console({"", "", "q"});

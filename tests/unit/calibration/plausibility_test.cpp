@@ -196,5 +196,24 @@ TEST(Doubts, OfSeveralPressesNameThePress) {
   EXPECT_THAT(doubts_about(made, set), Contains(HasSubstr("half: the press has not the shape")));
 }
 
+// Before: the press was left out of the LUT, and its shape then refused the good ones.
+TEST(Doubts, NoneOfAPressThatIsLeftOut) {
+  BallPresses set;
+  set.reference_q8 = Ball{}.reference_image_q8();
+  for (const double depth_mm : {0.5, 0.75, 1.0, 1.5}) {
+    set.presses.push_back(
+        {fmt::format("press of {}", depth_mm), {Ball{.depth_mm = depth_mm}.frame()}, {}});
+  }
+  image::Grey8 black = Ball{.depth_mm = 1.2}.frame();
+  for (auto& pixel : black.pixels) pixel = pixel < 190 ? 0 : pixel;
+  set.presses.push_back({"black", {black}, {}});
+  set.ball_radius_mm = 4;
+  set.mm_per_px = 0.05;
+  PressReport report;
+  const Calibration made = build(set, &report);
+  EXPECT_THAT(report.left_out, Contains(HasSubstr("black: the ball's image is black")));
+  EXPECT_THAT(doubts_about(made, set), IsEmpty());
+}
+
 }  // namespace
 }  // namespace dtact::calibration
