@@ -63,6 +63,8 @@ void CaptureLoop::step() noexcept {
   exchange_.turns.fetch_add(1, std::memory_order_relaxed);
   take_notes();
   executor_.take(watch_.away(), stamp(clock_.monotonic_ns()));
+  // Read once for each frame, so that none has only a part of a new request.
+  wanted_ = exchange_.wanted.load(std::memory_order_relaxed);
   choose_area();
   const std::int64_t asked_ns = clock_.monotonic_ns();
   const hal::GrabStatus status = camera_.grab(frame_, timeout_);
@@ -94,8 +96,7 @@ void CaptureLoop::take_notes() noexcept {
 // Decoding is most of the work on a frame, so decodes only the area that is used.
 void CaptureLoop::choose_area() noexcept {
   hal::Area area = whole_;
-  if (executor_.active() != nullptr && !tracker_.needs_whole_frame() &&
-      !exchange_.want_luma.load(std::memory_order_relaxed)) {
+  if (executor_.active() != nullptr && !tracker_.needs_whole_frame() && !wanted_.luma) {
     const recon::FrameRegion region = executor_.active()->image.cells.lattice().region();
     area = {region.x, region.y, region.width, region.height};
   }
@@ -116,7 +117,6 @@ void CaptureLoop::process(std::int64_t now_ns) noexcept {
   exchange_.sequence.store(info.sequence, std::memory_order_relaxed);
   exchange_.light_lag_ns.store(timeline_.delay_ns() + stamp_lag_ns(info.meaning, period_ns_),
                                std::memory_order_relaxed);
-  want_depth_ = exchange_.want_depth.load(std::memory_order_relaxed);
   controls_moved_ = (info.flags & hal::kFrameControlsMoved) != 0;
   const std::int64_t exposure_ns = exposure_start_ns(info, period_ns_);
 
@@ -162,9 +162,9 @@ void CaptureLoop::look(DepthFrame& out, const FrameState& moment) noexcept {
   }
   if (look.new_light) depth_.set_light(tracker_.light());
   if (look.rezeroed) executor_.answer(*look.rezeroed);
-  const bool measured = look.measurable && exchange_.want_contact.load(std::memory_order_relaxed);
+  const bool measured = look.measurable && wanted_.contact;
   if (measured) {
-    depth_.make(frame_.luma(), tracker_, want_depth_, out);
+    depth_.make(frame_.luma(), tracker_, wanted_.depth, out);
   } else if (executor_.active() == nullptr) {
     depth_.skip(out, ContactAbsence::uncalibrated);
   } else {
@@ -179,9 +179,8 @@ void CaptureLoop::look(DepthFrame& out, const FrameState& moment) noexcept {
 void CaptureLoop::publish(DepthFrame& out) noexcept {
   const std::int64_t began_ns = clock_.monotonic_ns();
   const bool made = out.has_depth;
-  const bool want_luma = exchange_.want_luma.load(std::memory_order_relaxed);
-  out.has_depth = made && want_depth_;
-  out.has_luma = want_luma && area_ == whole_;  // not when only the previous frame was asked for
+  out.has_depth = made && wanted_.depth;
+  out.has_luma = wanted_.luma;
   if (out.has_luma) {
     const hal::LumaView& luma = frame_.luma();
     const auto width = static_cast<std::size_t>(luma.width);
@@ -192,9 +191,9 @@ void CaptureLoop::publish(DepthFrame& out) noexcept {
       std::copy_n(luma.row(y), width, out.luma.data() + std::ptrdiff_t{y} * luma.width);
     }
   }
-  const bool want_jpeg = exchange_.want_jpeg.load(std::memory_order_relaxed);
   // The buffer holds a picture of this size without compression.
-  out.has_jpeg = want_jpeg && !frame_.jpeg().empty() && frame_.jpeg().size() <= out.jpeg.capacity();
+  out.has_jpeg =
+      wanted_.jpeg && !frame_.jpeg().empty() && frame_.jpeg().size() <= out.jpeg.capacity();
   if (out.has_jpeg) {
     out.jpeg_width = frame_.luma().width * decode_scale_;
     out.jpeg_height = frame_.luma().height * decode_scale_;
@@ -203,7 +202,7 @@ void CaptureLoop::publish(DepthFrame& out) noexcept {
   out.done_ns = clock_.monotonic_ns();
   out.times.publish_ns = out.done_ns - began_ns;
   exchange_.statistics.add(out.times, made, out.camera.ready_ns, out.done_ns);
-  if (!want_depth_ && !out.has_luma && !want_jpeg) return;
+  if (!wanted_.depth && !out.has_luma && !wanted_.jpeg) return;
   out.number = exchange_.frames.fetch_add(1, std::memory_order_relaxed) + 1;
   exchange_.slot.publish();
   exchange_.wake.signal();

@@ -22,11 +22,7 @@ struct Exchange {
   EventFd wake;                 ///< Readable when a frame or an event waits.
   Statistics statistics;
 
-  // Port::want().
-  std::atomic<bool> want_contact{false};
-  std::atomic<bool> want_depth{false};
-  std::atomic<bool> want_luma{false};
-  std::atomic<bool> want_jpeg{false};
+  std::atomic<Wanted> wanted{};  ///< Port::want()
   std::atomic<bool> stop{false};
   std::atomic<bool> not_realtime{false};
   /// A camera that was away delivers again: the network thread compares it with the calibration.

@@ -210,10 +210,8 @@ void Pipeline::compare_camera() {
 }
 
 void Pipeline::want(Wanted wanted) noexcept {
-  exchange_.want_contact.store(wanted.contact || wanted.depth, std::memory_order_relaxed);
-  exchange_.want_depth.store(wanted.depth, std::memory_order_relaxed);
-  exchange_.want_luma.store(wanted.luma, std::memory_order_relaxed);
-  exchange_.want_jpeg.store(wanted.jpeg, std::memory_order_relaxed);
+  wanted.contact = wanted.contact || wanted.depth;
+  exchange_.wanted.store(wanted, std::memory_order_relaxed);
 }
 
 Status Pipeline::status() const {

@@ -24,8 +24,7 @@ class SteppedLoop {
  public:
   explicit SteppedLoop(double fps = 60) : camera(*this, fps) {
     config.reference.frames = 16;
-    exchange.want_contact = true;
-    exchange.want_depth = true;
+    exchange.wanted = pipeline::Wanted{.contact = true, .depth = true};
   }
 
   /// Call it once the configuration is set.

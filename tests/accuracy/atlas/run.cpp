@@ -209,8 +209,7 @@ Outcome run(const Method& method, const Script& script) {
   prototype.depth_um.resize(static_cast<std::size_t>(table.width) *
                             static_cast<std::size_t>(table.height));
   pipeline::Exchange exchange(prototype);
-  exchange.want_contact = true;
-  exchange.want_depth = true;
+  exchange.wanted = pipeline::Wanted{.contact = true, .depth = true};
   camera.attach(exchange);
   pipeline::PipelineConfig config;
   config.reference.frames = 16;

@@ -186,8 +186,7 @@ struct Program::Impl {
         loop({camera, light, exchange, clock}, settings.daemon,
              pipeline::activate(calibration, camera.info(), settings.daemon.reconstruction), false),
         encoder("dtact_surface") {
-    exchange.want_contact = true;
-    exchange.want_depth = true;
+    exchange.wanted = pipeline::Wanted{.contact = true, .depth = true};
     loop.tracker().start();
   }
 

@@ -54,14 +54,13 @@ TEST(CaptureLoop, WhatIsHeldWhileAReferenceIsTakenIsNotLost) {
 
 TEST(CaptureLoop, SaysWhyContactIsNotMeasured) {
   SteppedLoop loop;
-  loop.exchange.want_luma = true;
+  loop.exchange.wanted = Wanted{.contact = true, .depth = true, .luma = true};
   loop.begin(nullptr);
   loop.step(3);
   EXPECT_EQ(loop.frame->contact_absence, ContactAbsence::uncalibrated);
   EXPECT_EQ(loop.frame->calibration, std::nullopt);
   SteppedLoop unheard;
-  unheard.exchange.want_contact = unheard.exchange.want_depth = false;
-  unheard.exchange.want_luma = true;
+  unheard.exchange.wanted = Wanted{.luma = true};
   unheard.begin(toy_calibration());
   unheard.step(1);
   EXPECT_EQ(unheard.frame->contact_absence, ContactAbsence::referencing);
@@ -141,11 +140,11 @@ TEST(CaptureLoop, SinceWhenALightShowsIsInTheFramesOwnTimestamps) {
 
 TEST(CaptureLoop, PublishesTheCamerasJpegWhenItIsWanted) {
   SteppedLoop loop;
-  loop.exchange.want_contact = loop.exchange.want_depth = false;
+  loop.exchange.wanted = Wanted{};
   loop.camera.jpeg = {0xff, 0xd8, 1, 0xff, 0xd9};
   loop.begin(toy_calibration());
   EXPECT_FALSE(loop.step()) << "nobody wants it";
-  loop.exchange.want_jpeg = true;
+  loop.exchange.wanted = Wanted{.jpeg = true};
   ASSERT_TRUE(loop.step());
   EXPECT_TRUE(loop.frame->has_jpeg);
   EXPECT_EQ(loop.frame->jpeg, loop.camera.jpeg);

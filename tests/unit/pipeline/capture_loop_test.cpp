@@ -248,7 +248,7 @@ TEST(CaptureLoop, ARezeroOfACameraThatWentAwayIsGivenUp) {
 
 TEST(CaptureLoop, MakesNoDepthThatNobodyListensTo) {
   SteppedLoop loop;
-  loop.exchange.want_contact = loop.exchange.want_depth = false;
+  loop.exchange.wanted = Wanted{};
   loop.begin(toy_calibration());
   loop.step(100);
   EXPECT_EQ(loop.exchange.state, State::serving);
@@ -267,7 +267,7 @@ TEST(CaptureLoop, MakesNoDepthThatNobodyListensTo) {
   EXPECT_TRUE(loop.health().has(Health::light_drifted));
   loop.camera.scene = {};
   loop.camera.scene.press_mm = 1;
-  loop.exchange.want_contact = true;
+  loop.exchange.wanted = Wanted{.contact = true};
   loop.step(5);
   ASSERT_EQ(loop.all<ContactChanged>().size(), 1U);
   EXPECT_NEAR(loop.all<ContactChanged>()[0].contact.deepest_mm, 1, 0.05);
@@ -276,7 +276,7 @@ TEST(CaptureLoop, MakesNoDepthThatNobodyListensTo) {
 // Light changes during contact without a subscriber: active tiles count as contact.
 TEST(CaptureLoop, TakesNoReferenceInContactThatNobodyHears) {
   SteppedLoop loop;
-  loop.exchange.want_contact = loop.exchange.want_depth = false;
+  loop.exchange.wanted = Wanted{};
   loop.begin(toy_calibration());
   loop.light->start();
   loop.step(100);
