@@ -42,6 +42,10 @@ class WaitTime {
     if (!first_ns_) first_ns_ = frame_ns;
     with_ = std::chrono::nanoseconds(*frame_ns - *first_ns_);
   }
+  void restart() {
+    with_ = without_ = std::chrono::nanoseconds(0);
+    first_ns_.reset();
+  }
   [[nodiscard]] std::chrono::nanoseconds length() const { return std::max(with_, without_); }
 
  private:
@@ -147,7 +151,7 @@ SteadyFrames Capture::hold(int count, bool forcible, const Objection& objection)
       steadiness.restart();
       continue;
     }
-    unusable = {};
+    unusable.restart();
     unusable.add(read_ns_);
     reported = false;
     std::string against = objection(*look);
