@@ -114,6 +114,9 @@ RateLimit::RateLimit(double hz) : period_ns_(hz > 0 ? std::llround(1e9 / hz) : 0
 
 bool RateLimit::admits(std::int64_t timestamp_ns, std::int64_t spacing_ns) noexcept {
   if (period_ns_ == 0) return true;
+  // It is at most 1.5 periods after the last frame let through. A time further back is another
+  // clock's: the daemon's machine restarted behind a program that passes frames on.
+  if (next_ns_ != INT64_MIN && timestamp_ns < next_ns_ - 2 * period_ns_) next_ns_ = INT64_MIN;
   if (next_ns_ != INT64_MIN) {
     // The next frame would lie further from the time than this one does.
     const std::int64_t near_ns = std::min(spacing_ns, period_ns_) / 2;

@@ -14,7 +14,8 @@ namespace dtact::net {
 
 /// Limits the rate to this number per second, as evenly as the frames allow. Passes the frame
 /// nearest to each period's time, so that neither the camera's jitter nor a rate that is no whole
-/// fraction of the camera's changes the number. Does not make up for a pause.
+/// fraction of the camera's changes the number. Does not make up for a pause, and begins anew when
+/// the clock goes back.
 class RateLimit {
  public:
   /// 0: no limit.

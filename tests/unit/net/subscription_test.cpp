@@ -72,6 +72,16 @@ TEST(RateLimit, APauseIsNotMadeUpFor) {
   EXPECT_TRUE(limit.admits(at(660), at(1) - at(0)));
 }
 
+// dtact-perceive keeps its clients while the daemon's machine restarts, and its clock with it.
+TEST(RateLimit, BeginsAnewWithAnotherClock) {
+  constexpr std::int64_t kTenDaysNs = 864'000'000'000'000;
+  RateLimit limit(10);
+  EXPECT_TRUE(limit.admits(kTenDaysNs, 0));
+  EXPECT_TRUE(limit.admits(at(0), 0));
+  EXPECT_FALSE(limit.admits(at(1), at(1) - at(0)));
+  EXPECT_TRUE(limit.admits(at(6), at(6) - at(5)));
+}
+
 Subscription made(const v1::Subscribe& request) {
   auto result = Subscription::from(request, {});
   return std::get<Subscription>(std::move(result));
