@@ -47,25 +47,27 @@ void ObjectTracker::begin_search(const ContactView& view) {
   search_ = std::move(search);
 }
 
-void ObjectTracker::finish_search() {
+bool ObjectTracker::finish_search() {
   if (!search_ || search_->result.wait_for(std::chrono::seconds(0)) != std::future_status::ready) {
-    return;
+    return false;
   }
   std::optional<Placement> found = search_->result.get();
   const Search search = std::move(*search_);
   search_.reset();
-  if (search.stop.stop_requested()) return;
+  if (search.stop.stop_requested()) return false;
   searched_area_ = search.area;
   if (!found) {
     pause_ = std::max(kPause, next_pause_);
     next_pause_ = std::min(2 * pause_, kMaxPause);
-    return;
+    return false;
   }
   next_pause_ = 0;
   const Motion back = search.contact.inverse();
   found->pose = back * found->pose;
   found->covariance = carried(found->covariance, back);
+  const bool contradicts = placement_ && !found->kept;
   placement_ = std::move(found);
+  return contradicts;
 }
 
 const Tracker::Pose& ObjectTracker::follow(const ContactView& view, std::uint64_t sequence) {
@@ -85,10 +87,10 @@ const Tracker::Pose& ObjectTracker::follow(const ContactView& view, std::uint64_
     searched_area_ = 0;
     pause_ = 0;
   }
-  finish_search();
-  const bool was_valid = pose_.valid();
+  const bool contradicted = finish_search();
+  const bool goes_on = pose_.valid() && !contradicted;
   if (placement_ && contact.valid()) {
-    pose_.state = was_valid ? State::tracked : since_ ? State::recovered : State::started;
+    pose_.state = goes_on ? State::tracked : since_ ? State::recovered : State::started;
     if (!since_) since_ = sequence;
     pose_.since = *since_;
     pose_.alternatives = placement_->alternatives;

@@ -47,8 +47,9 @@ class ObjectTracker {
   void stop_search() {
     if (search_) search_->stop.request_stop();
   }
-  /// Takes the result of a search that is over.
-  void finish_search();
+  /// Takes the result of a search that is over. Returns true if it contradicts the placement so
+  /// far.
+  bool finish_search();
 
   std::shared_ptr<const ObjectModel> object_;
   Tracker contact_;

@@ -223,6 +223,7 @@ class Search {
     Placement found;
     found.pose = patch_.frame * place_of(bottom, improved.move);
     found.score = improved.score;
+    found.kept = stays;
     found.covariance =
         carried(unknown_along(unobservable, patch_.middle, patch_.arm), patch_.frame);
     found.alternatives = static_cast<std::uint32_t>(families.size() - 1);

@@ -21,6 +21,7 @@ struct Placement {
   /// Other placements that explain the contact as well and that no motion along those directions
   /// leads to.
   std::uint32_t alternatives = 0;
+  bool kept = false;  ///< It is the pose so far, refined.
 };
 
 /// Searches all placements of the object: directions on a sphere in steps of 5° and the resting

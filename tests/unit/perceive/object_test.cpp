@@ -185,6 +185,46 @@ TEST(ObjectTracker, ALossIsReportedAndEndsWithASearch) {
   EXPECT_EQ(tracker.follow(jumped.view(), 5).state, State::tracked);
 }
 
+// A ball in contact says nothing of the larger one above it, until that one is in contact where the
+// placement does not have it.
+TEST(ObjectTracker, APlacementThatTheContactContradictsIsReported) {
+  const Vector3d small(0, 0, 1.2);
+  const Vector3d large(2.4, 0, 1.9);
+  const Balls object{{{small, 1.5}, {large, 2.2}}};
+  const auto turned = [&](const Vector3d& axis, double degrees) {
+    return moved(small) * moved({0, 0, 0}, axis, degrees) * moved(-small);
+  };
+  ObjectTracker tracker(model_of(object));
+  const Frame first(object, turned(Vector3d::UnitY(), -40), 2);
+  (void)tracker.follow(first.view(), 1);
+  tracker.wait();
+  ASSERT_EQ(tracker.follow(first.view(), 2).state, State::started);
+  const Vector3d beside = tracker.pose().alignment.motion.linear() * (large - small);
+  const double opposite = 180 + std::atan2(beside.y(), beside.x()) * 180 / M_PI;
+  const Motion truth = turned(Vector3d::UnitZ(), opposite);
+  const Frame second(object, truth, 2, 2);
+  EXPECT_EQ(tracker.follow(second.view(), 3).state, State::tracked);
+  ASSERT_TRUE(tracker.is_searching());
+  tracker.wait();
+  EXPECT_EQ(tracker.follow(second.view(), 4).state, State::recovered);
+  const Vector3d there = tracker.pose().alignment.motion * (1e-3 * large);
+  EXPECT_LT((there - truth * (1e-3 * large)).norm(), 3e-4);
+  EXPECT_EQ(tracker.follow(second.view(), 5).state, State::tracked);
+}
+
+TEST(SearchPlacement, SaysWhetherItKeepsThePoseSoFar) {
+  const Motion truth = moved({0.3, -0.2, 0}, Vector3d::UnitZ(), 100);
+  const Frame frame(bumps(), truth, 5);
+  const ContactPatch patch = make_patch(frame.view());
+  const auto model = model_of(bumps());
+  const auto kept = search(*model, patch, truth);
+  ASSERT_TRUE(kept.has_value());
+  EXPECT_TRUE(kept->kept);
+  const auto replaced = search(*model, patch, truth * moved({0, 0, 0}, Vector3d::UnitZ(), 90));
+  ASSERT_TRUE(replaced.has_value());
+  EXPECT_FALSE(replaced->kept);
+}
+
 TEST(ObjectTracker, AnotherContactBeginsWithASearch) {
   ObjectTracker tracker(model_of(bumps()));
   const Frame frame(bumps(), Motion::Identity(), 5);
