@@ -12,8 +12,8 @@ namespace {
 
 /// A contact that has grown by this factor shows more of the object: the search is repeated.
 constexpr double kSearchGrown = 1.5;
-/// Frames until the next search after one without result; doubles each time, up to
-/// kMaxPause.
+/// Frames until the next search after one without result, unless the contact grows; doubles each
+/// time, up to kMaxPause.
 constexpr int kPause = 30;
 constexpr int kMaxPause = 600;
 
@@ -104,7 +104,8 @@ const Tracker::Pose& ObjectTracker::follow(const ContactView& view, std::uint64_
     pose_.state = since_ ? State::lost : State::searching;
   }
   if (pause_ > 0) --pause_;
-  const bool again = placement_ ? view.area() >= kSearchGrown * searched_area_ : pause_ == 0;
+  const bool grown = searched_area_ > 0 && view.area() >= kSearchGrown * searched_area_;
+  const bool again = grown || (!placement_ && pause_ == 0);
   if (!search_ && again && contact.valid() && view.area() >= kMinArea) begin_search(view);
   return pose_;
 }

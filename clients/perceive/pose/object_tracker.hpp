@@ -55,7 +55,7 @@ class ObjectTracker {
   Tracker contact_;
   std::optional<Search> search_;
   std::optional<Placement> placement_;  ///< Relative to the contact's first frame.
-  double searched_area_ = 0;
+  double searched_area_ = 0;            ///< The contact's in the last search; 0: none yet.
   int pause_ = 0;                       ///< Frames until the next search may begin.
   int next_pause_ = 0;                  ///< After a search that found nothing; 0: the shortest.
   std::optional<std::uint64_t> since_;  ///< Frame in which the object was found first.

@@ -341,6 +341,28 @@ TEST(ObjectTracker, WhatIsNotFoundIsSearchedForEverMoreSeldom) {
   EXPECT_EQ(searches, 5);
 }
 
+TEST(ObjectTracker, WhatIsPressedDeeperIsSearchedForAtOnce) {
+  ObjectTracker tracker(model_of(bumps()));
+  const auto another = [](double depth_mm, unsigned seed) {
+    return Frame({{{{0, 0, 4.0 - depth_mm}, 4.0}}}, Motion::Identity(), 5, seed);
+  };
+  const Frame light = another(0.7, 1);
+  // Searches at 0, 30 and 90; the next without growth would be at 210.
+  for (unsigned i = 0; i < 120; ++i) {
+    (void)tracker.follow(light.view(), i);
+    tracker.wait();
+  }
+  ASSERT_FALSE(tracker.is_searching());
+  bool searched = false;
+  // The area grows by six tenths.
+  for (unsigned i = 0; i < 17; ++i) {
+    const Frame deeper = another(0.73 + 0.03 * i, 2 + i);
+    (void)tracker.follow(deeper.view(), 120 + i);
+    searched |= tracker.is_searching();
+  }
+  EXPECT_TRUE(searched);
+}
+
 TEST(ObjectTracker, ASearchThatIsNoLongerWantedEndsWithNothing) {
   const Frame frame(bumps(), Motion::Identity(), 5);
   std::stop_source stop;
