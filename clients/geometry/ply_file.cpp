@@ -78,6 +78,10 @@ Header parse_header(MeshReader& reader) {
       (void)reader.line();
     } else if (word == "element") {
       const std::string_view name = reader.word();
+      // Of two, one could have normals and the other none.
+      if (name == "vertex" && std::ranges::count(header.elements, name, &Element::name) > 0) {
+        reader.fail("a second element \"vertex\": write all vertices as one");
+      }
       const std::size_t count = whole(reader.number(), static_cast<double>(kMaxMeshParts),
                                       "an element's count (more: simplify the mesh)", reader);
       header.elements.push_back({name, count, {}});

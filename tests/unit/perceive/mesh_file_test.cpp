@@ -132,6 +132,7 @@ TEST(MeshFile, BrokenFilesAreReportedByPlaceAndFix) {
       "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float "
       "z\nend_header\n1 2 3\n";
   EXPECT_THAT(error_of(points), HasSubstr("neither faces nor normals"));
+  EXPECT_THAT(error_of(seed("two_clouds.ply")), HasSubstr("line 7: a second element \"vertex\""));
   EXPECT_THAT(error_of("solid x\nendsolid x\n"), HasSubstr("no points"));
   EXPECT_THAT(error_of(std::string(kMaxMeshBytes + 1, ' ')), HasSubstr("larger than 64 MiB"));
 }
