@@ -1,7 +1,7 @@
 #include "clients/perceive/depth_crop.hpp"
 
 #include <algorithm>
-#include <cmath>
+#include <climits>
 
 #include "clients/common/depth_message.hpp"
 
@@ -34,12 +34,13 @@ std::optional<DepthGrid> DepthCrop::crop(int left, int top, int right, int botto
 }
 
 std::optional<DepthGrid> DepthCrop::cut(const net::DepthRegion& region) {
-  const auto begin = [this](std::uint32_t pixel) { return static_cast<int>(pixel) / decimation_; };
-  const auto end = [this](std::uint32_t pixel, std::uint32_t size) {
-    return static_cast<int>((std::uint64_t{pixel} + size + static_cast<unsigned>(decimation_) - 1) /
-                            static_cast<unsigned>(decimation_));
+  const auto of_map = [this](std::int64_t pixel) {
+    return static_cast<int>(std::min<std::int64_t>(pixel / decimation_, INT_MAX));
   };
-  return crop(begin(region.x), begin(region.y), end(region.x, region.width),
+  const auto end = [&](std::uint32_t pixel, std::uint32_t size) {
+    return of_map(std::int64_t{pixel} + size + decimation_ - 1);
+  };
+  return crop(of_map(region.x), of_map(region.y), end(region.x, region.width),
               end(region.y, region.height));
 }
 

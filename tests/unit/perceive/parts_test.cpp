@@ -46,6 +46,12 @@ TEST(DepthCrop, CutsRegionsOfTheCalibrationsResolution) {
   EXPECT_EQ(cut->y, 21);
   EXPECT_THAT(cut->values, ElementsAre(11, 12, 13));
   EXPECT_FALSE(part.cut({0, 0, 10, 10}).has_value());
+  // As far as the map goes.
+  const auto rest = part.cut({23, 42, UINT32_MAX, UINT32_MAX});
+  ASSERT_TRUE(rest.has_value());
+  EXPECT_EQ(rest->width, 3);
+  EXPECT_EQ(rest->height, 2);
+  EXPECT_FALSE(part.cut({3'000'000'000U, 42, 1, 4}).has_value());
 }
 
 TEST(DepthCrop, RefusesMapsThatContradictThemselves) {
