@@ -44,9 +44,12 @@ std::optional<DepthGrid> DepthCrop::cut(const net::DepthRegion& region) {
               end(region.y, region.height));
 }
 
-std::optional<DepthGrid> DepthCrop::contact(double deepest_mm) {
-  const double um = std::min(kContactUm, 1000 * deepest_mm / 2);
-  const auto threshold = static_cast<int>(um / whole_.um_per_unit);
+std::optional<DepthGrid> DepthCrop::contact(const v1::Contact& contact) {
+  const double um = 1000 * std::min(contact.threshold_mm(), contact.deepest_mm() / 2);
+  // In this order NaN becomes a number as well.
+  constexpr double kMaxUnits = INT16_MAX;
+  const auto threshold =
+      static_cast<int>(std::max(0.0, std::min(kMaxUnits, um / whole_.um_per_unit)));
   int left = whole_.width;
   int right = -1;
   int top = whole_.height;

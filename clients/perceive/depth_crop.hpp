@@ -8,8 +8,9 @@
 #include "daemon/serve/frame_kind.hpp"
 
 namespace dtact::v1 {
+class Contact;
 class DepthMap;
-}
+}  // namespace dtact::v1
 
 namespace dtact::perceive {
 
@@ -29,13 +30,10 @@ class DepthCrop {
   /// The pixels of a region, grown outward to whole pixels of the map; nothing when the region lies
   /// beside it. The values are valid until the next call.
   [[nodiscard]] std::optional<DepthGrid> cut(const net::DepthRegion& region);
-  /// The same of the box around what is pressed deeper than kContactUm, or than half of
-  /// `deepest_mm` where that is less, kMarginPx around it.
-  [[nodiscard]] std::optional<DepthGrid> contact(double deepest_mm);
+  /// The same of the box around what is pressed deeper than the contact threshold, or than half of
+  /// the deepest where that is less, kMarginPx around it.
+  [[nodiscard]] std::optional<DepthGrid> contact(const v1::Contact& contact);
 
-  /// The daemon's default contact threshold. A lower threshold in its configuration is unknown
-  /// here.
-  static constexpr double kContactUm = 100;
   static constexpr int kMarginPx =
       16;  ///< Same as the daemon's, pixels of the calibration's resolution.
 

@@ -82,7 +82,7 @@ void FrameMaker::release_pose() {
 }
 
 void FrameMaker::follow(DepthCrop& depth, double uncertainty_um) {
-  const std::optional<DepthGrid> grid = depth.contact(frame_.contact().deepest_mm());
+  const std::optional<DepthGrid> grid = depth.contact(frame_.contact());
   if (!grid) return;
   const std::uint32_t took = timed([&] {
     clouds_.make(*grid, 1, contact_);
@@ -105,7 +105,7 @@ void FrameMaker::follow(DepthCrop& depth, double uncertainty_um) {
 void FrameMaker::add_cloud(DepthCrop& depth, const net::FrameKind& kind, v1::PointCloud& out) {
   std::optional<DepthGrid> grid;
   if (kind.contact_box) {
-    grid = depth.contact(frame_.contact().deepest_mm());
+    grid = depth.contact(frame_.contact());
   } else if (depth.is_whole()) {
     grid = kind.spec.region ? depth.cut(*kind.spec.region) : depth.whole();
   }

@@ -70,25 +70,50 @@ TEST(DepthCrop, RefusesMapsThatContradictThemselves) {
   EXPECT_THROW(with([](v1::DepthMap& map) { map.set_um_per_unit(-1); })(), client::ProtocolError);
 }
 
+v1::Contact contact_of(double deepest_mm, double threshold_mm = 0.1) {
+  v1::Contact contact;
+  contact.set_deepest_mm(deepest_mm);
+  contact.set_threshold_mm(threshold_mm);
+  return contact;
+}
+
 TEST(DepthCrop, TheContactHasAMargin) {
   std::vector<std::int16_t> values(12, 100);
   DepthCrop none(map_of(values));
-  EXPECT_FALSE(none.contact(0.3).has_value()) << "not deeper than the threshold";
+  EXPECT_FALSE(none.contact(contact_of(0.3)).has_value()) << "not deeper than the threshold";
   values[5] = 101;
   DepthCrop part(map_of(values));
-  const auto contact = part.contact(0.3);
+  const auto contact = part.contact(contact_of(0.3));
   ASSERT_TRUE(contact.has_value());
   EXPECT_EQ(contact->width, 4) << "cut at the map's border";
   EXPECT_EQ(contact->height, 3);
 }
 
-// The daemon's contact.threshold_mm is 0.03.
+TEST(DepthCrop, TheContactIsWhatTheDaemonCountsAsContact) {
+  std::vector<std::int16_t> values(40, 0);
+  values[2] = 60;
+  values[35] = 800;
+  v1::DepthMap map = map_of(values);
+  map.clear_x();
+  map.clear_y();
+  map.set_decimation(1);
+  map.set_width(40);
+  map.set_height(1);
+  DepthCrop part(map);
+  const auto left_of = [&part](double threshold_mm) {
+    const auto contact = part.contact(contact_of(0.8, threshold_mm));
+    return contact ? contact->x : -1;
+  };
+  EXPECT_EQ(left_of(0.02), 0) << "both";
+  EXPECT_EQ(left_of(0.3), 35 - DepthCrop::kMarginPx);
+}
+
 TEST(DepthCrop, ALightPressHasAContactAsWell) {
   std::vector<std::int16_t> values(12, 20);
   values[5] = 42;
   DepthCrop part(map_of(values));
-  EXPECT_TRUE(part.contact(0.042).has_value());
-  EXPECT_FALSE(part.contact(0.2).has_value());
+  EXPECT_TRUE(part.contact(contact_of(0.042)).has_value());
+  EXPECT_FALSE(part.contact(contact_of(0.2)).has_value());
 }
 
 TEST(DepthCrop, RefusesADamagedMap) {
