@@ -2,8 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <cmath>
 #include <cstdint>
 
 #include "clients/cpp/errors.hpp"
@@ -48,11 +46,11 @@ bool is_placed(const v1::DepthMap& map) {
 }
 
 [[noreturn]] void refuse(const v1::DepthMap& map) {
-  throw client::ProtocolError(fmt::format(
-      "a depth map of {}x{} pixels at {}, {} of {}x{}, {} mm a pixel and {} um a unit contradicts "
-      "itself: install the same release on both sides",
-      map.width(), map.height(), map.x(), map.y(), map.full_width(), map.full_height(),
-      map.mm_per_px(), map.um_per_unit()));
+  throw client::ProtocolError(
+      fmt::format("a depth map of {}x{} pixels at {}, {} of {}x{}, {} mm a pixel, {} um a unit and "
+                  "decimation {} contradicts itself: install the same release on both sides",
+                  map.width(), map.height(), map.x(), map.y(), map.full_width(), map.full_height(),
+                  map.mm_per_px(), map.um_per_unit(), map.decimation()));
 }
 
 }  // namespace
@@ -106,8 +104,10 @@ void set_surface(const recon::Surface& surface, v1::Frame& frame) {
 }
 
 std::vector<std::int16_t> depths_of(const v1::DepthMap& map) {
-  const bool scaled = map.mm_per_px() > 0 && std::isfinite(map.mm_per_px()) &&
-                      map.um_per_unit() > 0 && std::isfinite(map.um_per_unit());
+  // A calibration has 0.0001 to 10 mm a pixel.
+  constexpr std::uint32_t kMaxDecimation = 64;
+  const bool scaled = within(map.mm_per_px(), 1e-4, 10.0 * kMaxDecimation) &&
+                      within(map.um_per_unit(), 1e-3, 1e3) && map.decimation() <= kMaxDecimation;
   if (!is_placed(map) || !scaled) refuse(map);
   return client::values_of(map);
 }

@@ -19,7 +19,7 @@ namespace dtact::cli {
 void set_surface(const recon::Surface& surface, v1::Frame& frame);
 
 /// Like client::values_of(), which checks only the values. Throws client::ProtocolError also where
-/// the map's place or scale contradicts itself.
+/// the map's place contradicts itself, and for a scale that no sensor has.
 [[nodiscard]] std::vector<std::int16_t> depths_of(const v1::DepthMap& map);
 /// The map with these values (depths_of()), which have to outlive it.
 [[nodiscard]] perceive::DepthGrid grid_of(const v1::DepthMap& map,

@@ -68,6 +68,13 @@ TEST(DepthCrop, RefusesMapsThatContradictThemselves) {
                client::ProtocolError);
   EXPECT_THROW(with([](v1::DepthMap& map) { map.set_mm_per_px(0); })(), client::ProtocolError);
   EXPECT_THROW(with([](v1::DepthMap& map) { map.set_um_per_unit(-1); })(), client::ProtocolError);
+  EXPECT_THROW(with([](v1::DepthMap& map) { map.set_mm_per_px(1e-9); })(), client::ProtocolError);
+  EXPECT_THROW(with([](v1::DepthMap& map) { map.set_mm_per_px(INFINITY); })(),
+               client::ProtocolError);
+  EXPECT_THROW(with([](v1::DepthMap& map) { map.set_um_per_unit(1e-300); })(),
+               client::ProtocolError);
+  EXPECT_THROW(with([](v1::DepthMap& map) { map.set_decimation(0x7FFFFFFF); })(),
+               client::ProtocolError);
 }
 
 v1::Contact contact_of(double deepest_mm, double threshold_mm = 0.1) {
