@@ -6,6 +6,7 @@
 
 #include "clients/geometry/mesh_file.hpp"
 #include "hal/base/atomic_file.hpp"
+#include "hal/base/utf8.hpp"
 
 namespace dtact::perceive {
 
@@ -14,7 +15,7 @@ std::shared_ptr<const ObjectModel> load_object(const std::filesystem::path& file
   const Mesh mesh = parse_mesh(base::read_file(file, kMaxMeshBytes), file.string());
   try {
     return std::make_shared<const ObjectModel>(
-        make_object(mesh, unit == "m" ? 1 : 1e-3, file.stem().string()));
+        make_object(mesh, unit == "m" ? 1 : 1e-3, base::as_utf8(file.stem().string())));
   } catch (const std::runtime_error& e) {
     throw std::runtime_error(
         fmt::format("{}, read in {} (--object-unit): {}", file.string(), unit, e.what()));

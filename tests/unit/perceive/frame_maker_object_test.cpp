@@ -2,10 +2,13 @@
 #include <gtest/gtest.h>
 
 #include <chrono>
+#include <filesystem>
 #include <thread>
 
 #include "clients/perceive/frame_maker.hpp"
+#include "clients/perceive/object_file.hpp"
 #include "proto/dtact.pb.h"
+#include "tests/fakes/own_path.hpp"
 #include "tests/unit/perceive/balls.hpp"
 
 namespace dtact::perceive {
@@ -94,6 +97,15 @@ TEST(FrameMakerOfAnObject, SearchesFindsAndFollowsInEachContact) {
     ASSERT_TRUE(made.ParseFromString(maker.make(kind)->body));
     EXPECT_FALSE(made.has_pose());
   }
+}
+
+// A frame's text that is not UTF-8 would make its message unreadable.
+TEST(FrameMakerOfAnObject, ItsNameIsUtf8) {
+  const std::filesystem::path file = fakes::own_path("Schl\xfcssel.ply");
+  std::filesystem::copy_file(DTACT_SOURCE_DIR "/tests/fuzz/corpus/mesh/ascii.ply", file);
+  const auto object = load_object(file, "mm");
+  std::filesystem::remove(file);
+  EXPECT_TRUE(object->name.ends_with("Schl?ssel")) << object->name;
 }
 
 // Another calibration may place the same pixels elsewhere, and a daemon that was away does not
