@@ -8,6 +8,11 @@
 namespace dtact::cli {
 
 void add_listen_options(CLI::App& command, net::NetConfig& settings) {
+  settings.names = {.address = "--listen ",
+                    .tls_certificate = "--tls-certificate",
+                    .tls_key = "--tls-key",
+                    .tokens = "--tokens",
+                    .insecure = "--listen-insecure"};
   command
       .add_option("--listen", settings.address,
                   "Address to listen on; beyond this machine it needs TLS and tokens")

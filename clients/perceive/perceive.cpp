@@ -31,6 +31,7 @@ void serve(const cli::Context& context, const Settings& settings) {
   config.program = "dtact-perceive " DTACT_VERSION;
   config.version = DTACT_VERSION;
   config.features = wire::kPerceiveFeatures;
+  config.anonymous_rights = net::Rights::view;  // it takes no command
   // A line each, for a terminal and for the journal alike.
   config.log = [&out = context.out](const net::LogLine& line) {
     out << line.text << '\n' << std::flush;

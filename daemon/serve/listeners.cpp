@@ -27,7 +27,8 @@ Listeners::Listeners(boost::asio::io_context& io, NetConfig settings)
   }
   if (listeners_.empty()) {
     throw std::runtime_error(
-        "net.address and net.unix_socket are empty, so that nobody could connect: set one");
+        "there is neither an address nor a Unix socket to listen on, so that nobody could connect: "
+        "set one");
   }
 }
 

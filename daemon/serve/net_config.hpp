@@ -36,6 +36,16 @@ struct LogLine {
 /// Called on the network thread only; must not throw.
 using Log = std::function<void(const LogLine&)>;
 
+/// What a user writes to change a setting, for messages: a key of the configuration file, or an
+/// option.
+struct SettingNames {
+  const char* address = "net.address = ";  ///< Before its value.
+  const char* tls_certificate = "net.tls_certificate";
+  const char* tls_key = "net.tls_key";
+  const char* tokens = "net.tokens";
+  const char* insecure = "net.listen_insecure = true";
+};
+
 /// Settings of the network part.
 struct NetConfig {
   /// IPv4 or IPv6 address to listen on. "0.0.0.0" or "::" (which takes IPv4 too) for every
@@ -72,6 +82,7 @@ struct NetConfig {
   int fifo_priority = 20;
   std::string realtime_refused;  ///< … and says here why it was refused; in status.
   std::filesystem::path thermal_folder = "/sys/class/thermal";  ///< See base::temperatures().
+  SettingNames names;
   Log log = [](const LogLine&) {};
 };
 

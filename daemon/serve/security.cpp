@@ -8,6 +8,15 @@
 #include "daemon/serve/limited_log.hpp"
 
 namespace dtact::net {
+namespace {
+
+/// What a client without a token may do.
+const char* anyone_may(const NetConfig& config) {
+  return config.token_file.empty() && config.anonymous_rights > Rights::view ? "watch and command"
+                                                                             : "watch";
+}
+
+}  // namespace
 
 boost::asio::ip::address listen_address(const NetConfig& config) {
   boost::system::error_code error;
@@ -30,27 +39,29 @@ bool is_insecure(const NetConfig& config) {
 }
 
 void check_security(const NetConfig& config) {
+  const SettingNames& names = config.names;
   if (!config.address.empty()) (void)listen_address(config);
   if (config.tls_certificate.empty() != config.tls_key.empty()) {
-    throw std::runtime_error(fmt::format(
-        "net.tls_certificate = \"{}\" and net.tls_key = \"{}\": set both or none; dtactctl cert "
-        "makes a pair",
-        config.tls_certificate.string(), config.tls_key.string()));
+    throw std::runtime_error(
+        fmt::format("only one of {} and {} is set: set both or none; dtactctl cert makes a pair",
+                    names.tls_certificate, names.tls_key));
   }
   if (!is_insecure(config) || config.insecure) return;
   std::string missing;
   if (config.tls_certificate.empty()) {
-    missing = "net.tls_certificate and net.tls_key (dtactctl cert makes a pair)";
+    missing =
+        fmt::format("{} and {} (dtactctl cert makes a pair)", names.tls_certificate, names.tls_key);
   }
   if (config.token_file.empty()) {
     if (!missing.empty()) missing += " and ";
-    missing += "net.tokens (dtactctl token --new control -o FILE prints a line for it)";
+    missing += names.tokens;
+    missing += " (dtactctl token --new control -o FILE prints a line for it)";
   }
-  throw std::runtime_error(fmt::format(
-      "net.address = \"{}\" opens the sensor to other machines, which needs TLS and a "
-      "token: set {}; or net.listen_insecure = true, if every host that reaches it may watch "
-      "and command; or net.address = \"127.0.0.1\"",
-      config.address, missing));
+  throw std::runtime_error(
+      fmt::format("{0}\"{1}\" opens the sensor to other machines, which needs TLS and a token: set "
+                  "{2}; or {3}, "
+                  "if every host that reaches it may {4}; or {0}\"127.0.0.1\"",
+                  names.address, config.address, missing, names.insecure, anyone_may(config)));
 }
 
 NetConfig checked(NetConfig config) {
@@ -58,14 +69,9 @@ NetConfig checked(NetConfig config) {
   if (is_insecure(config)) {
     config.log(
         {LogLevel::warning,
-         fmt::format(
-             "net.listen_insecure: every host that reaches {} may {} the sensor, since there is no "
-             "{}",
-             config.address,
-             config.token_file.empty() && config.anonymous_rights > Rights::view
-                 ? "watch and command"
-                 : "watch",
-             config.token_file.empty() ? "token" : "TLS to keep a token secret")});
+         fmt::format("{}: every host that reaches {} may {} the sensor, since there is no {}",
+                     config.names.insecure, config.address, anyone_may(config),
+                     config.token_file.empty() ? "token" : "TLS to keep a token secret")});
   }
   config.log = limited(std::move(config.log));
   return config;

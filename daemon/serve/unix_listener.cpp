@@ -33,7 +33,7 @@ sockaddr_un address_of(const fs::path& path) {
   if (text.size() >= sizeof address.sun_path) {
     refuse_path(path,
                 fmt::format("{} bytes are more than a socket's path may have, {}: choose a shorter "
-                            "net.unix_socket",
+                            "one",
                             text.size(), sizeof address.sun_path - 1));
   }
   text.copy(static_cast<char*>(address.sun_path), text.size());
@@ -50,15 +50,14 @@ void remove_stale(const fs::path& path, const sockaddr_un& address) {
   struct stat status{};
   if (::lstat(path.c_str(), &status) != 0) return;
   if (!S_ISSOCK(status.st_mode)) {
-    refuse_path(
-        path, "there is something that is no socket: remove it or choose another net.unix_socket");
+    refuse_path(path, "there is something that is no socket: remove it or choose another path");
   }
   const base::UniqueFd probe = make_socket();
   if (::connect(probe.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0 ||
       errno != ECONNREFUSED) {
     refuse_path(path,
                 "another program listens there, perhaps another dtactd (systemctl status dtactd): "
-                "stop it or choose another net.unix_socket");
+                "stop it or choose another path");
   }
   ::unlink(path.c_str());
 }
@@ -72,7 +71,7 @@ class SocketFile {
     fd_ = make_socket();
     if (::bind(fd_.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
       const int error = errno;
-      refuse_path(path, fmt::format("{}; net.unix_socket needs a folder that this user may write",
+      refuse_path(path, fmt::format("{}; the socket needs a folder that this user may write",
                                     std::strerror(error)));
     }
     // Everybody may connect; who the peer is decides what it may do.

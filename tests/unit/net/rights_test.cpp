@@ -291,7 +291,8 @@ TEST(Security, ReportsWhereAnybodyMayCome) {
   Rig rig(config);
   EXPECT_THAT(
       rig.log(),
-      HasSubstr("net.listen_insecure: every host that reaches 0.0.0.0 may watch and command"));
+      HasSubstr(
+          "net.listen_insecure = true: every host that reaches 0.0.0.0 may watch and command"));
   RawClient client(rig.tcp_port());
   client.hello();
   const auto status =

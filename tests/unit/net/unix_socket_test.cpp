@@ -155,9 +155,9 @@ TEST_F(UnixSocket, NeverReplacesAFile) {
 
 TEST_F(UnixSocket, NamesWhatIsWrongWithItsPath) {
   config_.unix_socket = folder_.path() / "no" / "folder";
-  EXPECT_THAT(refusal(), HasSubstr("net.unix_socket needs a folder"));
+  EXPECT_THAT(refusal(), HasSubstr("the socket needs a folder"));
   config_.unix_socket = folder_.path() / std::string(108, 'x');
-  EXPECT_THAT(refusal(), HasSubstr("choose a shorter net.unix_socket"));
+  EXPECT_THAT(refusal(), HasSubstr("choose a shorter one"));
 }
 // NOLINTEND(misc-const-correctness)
 
