@@ -87,14 +87,14 @@ void add_serve(CLI::App& app, cli::Context& context) {
       ->add_option("--unix-socket", settings->net.unix_socket,
                    "A socket for clients on this machine, too")
       ->type_name("FILE");
-  command
-      ->add_option(
-          "--object", settings->object,
-          "The shape of the object in contact: poses are then its place in the sensor's frame, "
-          "not the motion since first contact. STL, PLY with faces, or a PLY cloud with outward "
-          "normals, of at most 64 MiB")
-      ->type_name("FILE");
+  auto* object = command->add_option(
+      "--object", settings->object,
+      "The shape of the object in contact: poses are then its place in the sensor's frame, "
+      "not the motion since first contact. STL, PLY with faces, or a PLY cloud with outward "
+      "normals, of at most 64 MiB");
+  object->type_name("FILE");
   command->add_option("--object-unit", settings->object_unit, "Of the lengths in that file")
+      ->needs(object)
       ->check(CLI::IsMember({"mm", "m"}))
       ->capture_default_str();
   command

@@ -36,5 +36,9 @@ TEST(Options, AnOpenAddressIsRefusedByTheOptionsThatGuardIt) {
                     HasSubstr("may watch;"), Not(HasSubstr("net."))));
 }
 
+TEST(Options, AUnitWithoutAnObjectIsRefused) {
+  EXPECT_EQ(ran({"serve", "--listen", "nowhere", "--object-unit", "m"}).code, cli::kUsage);
+}
+
 }  // namespace
 }  // namespace dtact::perceive
