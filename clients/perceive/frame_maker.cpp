@@ -62,13 +62,13 @@ void FrameMaker::begin(v1::Frame frame, Wanted wanted) {
 
 void FrameMaker::follow_sensor() {
   const recon::Surface surface = cli::surface_of(frame_.surface());
-  if (surface != clouds_.surface()) {
-    clouds_ = CloudMaker(surface);
-    release();
-  }
   const auto calibration =
       frame_.has_calibration() ? std::optional(frame_.calibration()) : std::nullopt;
-  if (std::exchange(calibration_, calibration) != calibration) release();
+  const bool other = std::exchange(calibration_, calibration) != calibration;
+  if (surface == clouds_.surface() && !other) return;
+  if (surface != clouds_.surface()) clouds_ = CloudMaker(surface);
+  release_pose();
+  if (recognition_) recognition_->forget();
 }
 
 void FrameMaker::release() {

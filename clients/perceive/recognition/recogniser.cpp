@@ -88,6 +88,11 @@ void Evidence::release() {
   now_ = {};
 }
 
+void Evidence::forget() {
+  now_ = {};
+  before_.clear();
+}
+
 std::vector<double> Evidence::taught_probabilities(const std::vector<const Press*>& presses) const {
   std::vector<double> out;
   if (!taught_) return out;

@@ -69,6 +69,8 @@ class Evidence {
   void add(const TouchMap& map, const Network::Output& output);
   /// The contact has ended.
   void release();
+  /// Another sensor or calibration: earlier contacts no longer count.
+  void forget();
   /// Of the last `presses` contacts, the present one included. A contact too shallow to tell
   /// anything does not count.
   [[nodiscard]] Recognised result(int presses) const;

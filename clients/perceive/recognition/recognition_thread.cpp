@@ -52,6 +52,12 @@ void RecognitionThread::release() {
   evidence_.release();
 }
 
+void RecognitionThread::forget() {
+  release();
+  const std::scoped_lock lock(mutex_);
+  evidence_.forget();
+}
+
 void RecognitionThread::wait() {
   std::unique_lock lock(mutex_);
   changed_.wait(lock, [this] { return !waiting_ && !busy_; });

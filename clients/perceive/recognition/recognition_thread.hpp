@@ -34,6 +34,8 @@ class RecognitionThread {
   void offer(const DepthGrid& depth, std::uint64_t sequence);
   /// The contact has ended.
   void release();
+  /// The same, and earlier contacts no longer count: another sensor or calibration.
+  void forget();
   /// What the present contact shows, joined with those before it to `presses` in all. False until
   /// there is an answer.
   [[nodiscard]] bool fill(int presses, v1::Recognition& out) const;

@@ -235,6 +235,29 @@ TEST(FrameMaker, RecognisesOnlyOnRequestAndDuringContact) {
   EXPECT_FALSE(made(maker, wanted).has_recognition());
 }
 
+TEST(FrameMaker, PressesOfAnotherCalibrationAreNotJoined) {
+  FrameMaker maker;
+  net::FrameKind wanted;
+  wanted.recognition = 5;
+  const auto begin = [&maker](bool in_contact, std::uint64_t calibration) {
+    v1::Frame frame = frame_of(in_contact);
+    frame.set_calibration(calibration);
+    *frame.mutable_depth() = whole(map_of(std::vector<std::int16_t>(12, 800)));
+    maker.begin(frame, {.recognition = true});
+  };
+  const auto presses = [&](std::uint64_t calibration) {
+    begin(true, calibration);
+    maker.wait();
+    const std::uint32_t joined = made(maker, wanted).recognition().presses();
+    begin(false, calibration);
+    return joined;
+  };
+  EXPECT_EQ(presses(1), 1U);
+  EXPECT_EQ(presses(1), 2U);
+  EXPECT_EQ(presses(2), 1U);
+  EXPECT_EQ(presses(2), 2U);
+}
+
 TEST(FrameMaker, OfAPartOfTheMapThereAreNoPointsOfAll) {
   FrameMaker maker;
   v1::Frame part = frame_of(true);
