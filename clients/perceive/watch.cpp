@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cctype>
 #include <chrono>
 #include <memory>
 #include <ostream>
@@ -9,6 +11,7 @@
 
 #include "clients/common/interruptible.hpp"
 #include "clients/common/json.hpp"
+#include "clients/cpp/names.hpp"
 
 namespace dtact::perceive {
 namespace {
@@ -26,21 +29,12 @@ v1::Subscribe wanted() {
   return subscription;
 }
 
-const char* name_of(v1::ObjectPose::Tracking tracking) {
-  switch (tracking) {
-    case v1::ObjectPose::STARTED:
-      return "started";
-    case v1::ObjectPose::TRACKED:
-      return "tracked";
-    case v1::ObjectPose::LOST:
-      return "lost";
-    case v1::ObjectPose::RECOVERED:
-      return "recovered";
-    case v1::ObjectPose::SEARCHING:
-      return "searching";
-    default:
-      return "unknown";
-  }
+/// "tracked".
+std::string name_of(v1::ObjectPose::Tracking tracking) {
+  std::string name(v1::ObjectPose::Tracking_Name(tracking));
+  std::ranges::transform(name, name.begin(),
+                         [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return name;
 }
 
 /// "  tracked: moved (1.02, 0.00, -0.10) mm, ...", "  nut tracked: at ...", "  nut searching".
@@ -82,25 +76,14 @@ std::string words_of(const v1::Recognition& found) {
   return fmt::format("  {} or {}", candidate(0), candidate(1));
 }
 
-/// "  1.20 N +- 0.03", "  force not calibrated".
+/// "  1.20 N +- 0.03", "  force not calibrated", "  force cut_off".
 std::string force_words(const v1::Contact& contact) {
-  if (!contact.has_force_n()) return "  force not calibrated";
-  return fmt::format("  {:.2f} N +- {:.2f}", contact.force_n(), contact.force_uncertainty_n());
-}
-
-/// "58.1 fps  1.20 N +- 0.03  12,340 points in 0.21 ms  tracked: moved (1.02, 0.00, -0.10) mm,
-/// ...".
-std::string line_of(const v1::Frame& frame, double fps) {
-  std::string line = fmt::format("{:.1f} fps", fps);
-  if (!frame.contact().in_contact()) return line + "  there is no contact\n";
-  line += force_words(frame.contact());
-  if (frame.has_recognition()) line += words_of(frame.recognition());
-  if (frame.has_cloud()) {
-    line += fmt::format("  {} points in {:.2f} ms", frame.cloud().points(),
-                        frame.cloud().make_ns() * 1e-6);
+  if (contact.has_force_n()) {
+    return fmt::format("  {:.2f} N +- {:.2f}", contact.force_n(), contact.force_uncertainty_n());
   }
-  if (frame.has_pose()) line += words_of(frame.pose());
-  return line + "\n";
+  return contact.force_absence() > v1::FORCE_ABSENCE_UNCALIBRATED
+             ? "  force " + client::name_of(contact.force_absence())
+             : "  force not calibrated";
 }
 
 void watch(const cli::Context& context, double seconds) {
@@ -115,16 +98,21 @@ void watch(const cli::Context& context, double seconds) {
     const auto now = Clock::now();
     if (seconds > 0 && now - start > std::chrono::duration<double>(seconds)) break;
     const auto* frame = item ? std::get_if<v1::Frame>(&*item) : nullptr;
-    if (frame == nullptr) continue;
-    ++frames;
+    if (frame != nullptr) ++frames;
     const std::chrono::duration<double> passed = now - reported;
-    if (passed.count() < 1) continue;
-    if (context.json) {
+    if (passed.count() < (frame != nullptr ? 1 : 2)) continue;
+    if (frame == nullptr) {
+      const std::string advice = client.status().advice();
+      if (!context.json) {
+        context.out << "no frames: " << (advice.empty() ? "dtactctl status says why" : advice)
+                    << '\n';
+      }
+    } else if (context.json) {
       v1::Frame shown = *frame;
       if (shown.has_cloud()) shown.mutable_cloud()->clear_data();
       context.out << cli::json_line(shown);
     } else {
-      context.out << line_of(*frame, frames / passed.count());
+      context.out << watch_line(*frame, frames / passed.count());
     }
     context.out << std::flush;
     reported = now;
@@ -133,6 +121,24 @@ void watch(const cli::Context& context, double seconds) {
 }
 
 }  // namespace
+
+std::string watch_line(const v1::Frame& frame, double fps) {
+  std::string line = fmt::format("{:.1f} fps", fps);
+  if (!frame.has_contact()) {
+    return line + (frame.contact_absence() == v1::CONTACT_ABSENCE_UNCALIBRATED
+                       ? "  contact not measured: no calibration\n"
+                       : "  contact not measured: the reference is being taken\n");
+  }
+  if (!frame.contact().in_contact()) return line + "  no contact\n";
+  line += force_words(frame.contact());
+  if (frame.has_recognition()) line += words_of(frame.recognition());
+  if (frame.has_cloud()) {
+    line += fmt::format("  {} points in {:.2f} ms", frame.cloud().points(),
+                        frame.cloud().make_ns() * 1e-6);
+  }
+  if (frame.has_pose()) line += words_of(frame.pose());
+  return line + "\n";
+}
 
 void add_watch(CLI::App& app, cli::Context& context) {
   auto* command = app.add_subcommand("watch",
