@@ -52,9 +52,14 @@ void Server::reload() {
   session_list_.end_revoked();
 }
 
-void Server::introduce(v1::HelloReply& reply) const { reply.set_serial(serial()); }
+void Server::introduce(v1::HelloReply& reply) const {
+  const v1::HelloReply known = daemon();
+  reply.set_name(known.name());
+  reply.set_serial(known.serial());
+  if (known.has_surface_frame()) *reply.mutable_surface_frame() = known.surface_frame();
+}
 
-std::string Server::serial() const { return upstream_ ? upstream_->serial() : ""; }
+v1::HelloReply Server::daemon() const { return upstream_ ? upstream_->daemon() : v1::HelloReply(); }
 
 void Server::on_frame() {
   if (!upstream_) return;
@@ -133,11 +138,11 @@ void Server::on_request(const std::shared_ptr<net::Session>& session,
 }
 
 void Server::fill(v1::Status& status) const {
-  const net::NetConfig& config = listeners_.config();
+  const v1::HelloReply known = daemon();
   status.set_state(v1::STATE_SERVING);
-  status.set_version(config.version);
-  status.set_name(config.name);
-  status.set_serial(serial());
+  status.set_version(listeners_.config().version);
+  status.set_name(known.name());
+  status.set_serial(known.serial());
   status.set_frames(frames_);
   status.set_skipped(skipped_);
   const std::chrono::duration<double> uptime = std::chrono::steady_clock::now() - start_;

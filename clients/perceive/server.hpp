@@ -45,8 +45,8 @@ class Server : public net::SessionHost, public std::enable_shared_from_this<Serv
   void update_want();
   void subscribe(const std::shared_ptr<net::Session>& session, std::uint64_t id,
                  const v1::Subscribe& request);
-  /// The camera's serial number; empty if the daemon has none.
-  [[nodiscard]] std::string serial() const;
+  /// What the daemon last said of itself; empty before it was reached.
+  [[nodiscard]] v1::HelloReply daemon() const;
   void fill(v1::Status& status) const;
 
   boost::asio::io_context& io_;

@@ -14,8 +14,8 @@ Upstream::Upstream(client::Options options, Handlers handlers)
     : handlers_(std::move(handlers)),
       host_(options.host),
       link_(std::move(options),
-            {.up = [this](const v1::HelloReply& daemon,
-                          bool same_machine) { on_up(daemon, same_machine); },
+            {.up = [this](v1::HelloReply daemon,
+                          bool same_machine) { on_up(std::move(daemon), same_machine); },
              .down = handlers_.notice,
              .message = [this](const std::string& bytes) { on_message(bytes); }}) {}
 
@@ -30,21 +30,22 @@ std::optional<NewestFrame::Taken> Upstream::take() {
   return newest_.take();
 }
 
-std::string Upstream::serial() const {
+v1::HelloReply Upstream::daemon() const {
   const std::lock_guard lock(mutex_);
-  return serial_;
+  return daemon_;
 }
 
-void Upstream::on_up(const v1::HelloReply& daemon, bool same_machine) {
+void Upstream::on_up(v1::HelloReply daemon, bool same_machine) {
+  const std::string program = daemon.program();
   {
     const std::lock_guard lock(mutex_);
-    serial_ = daemon.serial();
+    daemon_ = std::move(daemon);
     newest_.part();
     // Raw values cost least where they need not travel.
     compressed_ = !same_machine;
     subscribe();
   }
-  handlers_.notice("connected to " + daemon.program() + " at " + host_);
+  handlers_.notice("connected to " + program + " at " + host_);
 }
 
 /// Under the mutex, so that what is wanted last is said last. Lost while the daemon is away:

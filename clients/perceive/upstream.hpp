@@ -29,10 +29,11 @@ class Upstream {
 
   /// The newest frame that was not taken yet.
   [[nodiscard]] std::optional<NewestFrame::Taken> take();
-  [[nodiscard]] std::string serial() const;
+  /// What the daemon last said of itself; empty before it was reached.
+  [[nodiscard]] v1::HelloReply daemon() const;
 
  private:
-  void on_up(const v1::HelloReply& daemon, bool same_machine);
+  void on_up(v1::HelloReply daemon, bool same_machine);
   void on_message(const std::string& bytes);
   void subscribe();
 
@@ -42,7 +43,7 @@ class Upstream {
   v1::Subscribe wanted_;
   bool compressed_ = false;  ///< Depth, since it travels.
   NewestFrame newest_;
-  std::string serial_;
+  v1::HelloReply daemon_;
   cli::Link link_;  ///< Last: its thread uses the others.
 };
 
