@@ -72,8 +72,13 @@ void Server::on_frame() {
   try {
     maker_.begin(std::move(taken->frame), extras_);
   } catch (const client::ProtocolError& e) {
-    return listeners_.config().log({net::LogLevel::warning, e.what()});
+    // Once, not with each frame.
+    if (std::exchange(damage_, e.what()) != e.what()) {
+      listeners_.config().log({net::LogLevel::warning, damage_});
+    }
+    return;
   }
+  damage_.clear();
   for (const auto& session : session_list_.all()) {
     const auto kind = session->due(timestamp_ns, taken->missed);
     if (!kind) continue;
@@ -139,7 +144,9 @@ void Server::on_request(const std::shared_ptr<net::Session>& session,
 
 void Server::fill(v1::Status& status) const {
   const v1::HelloReply known = daemon();
-  status.set_state(v1::STATE_SERVING);
+  const std::string away = upstream_ ? upstream_->away() : "";
+  status.set_advice(away.empty() ? damage_ : away);
+  status.set_state(status.advice().empty() ? v1::STATE_SERVING : v1::STATE_UNSPECIFIED);
   status.set_version(listeners_.config().version);
   status.set_name(known.name());
   status.set_serial(known.serial());

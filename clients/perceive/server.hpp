@@ -59,6 +59,7 @@ class Server : public net::SessionHost, public std::enable_shared_from_this<Serv
   FrameMaker::Wanted extras_;  ///< What clients need beside points.
   bool in_contact_ = false;    ///< In the last frame.
   double mm_per_px_ = 0;       ///< Of the last whole map.
+  std::string damage_;         ///< Why the last frame could not be read; empty if it could.
   std::uint64_t frames_ = 0;
   std::uint64_t skipped_ = 0;
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();

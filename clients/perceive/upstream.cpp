@@ -16,7 +16,7 @@ Upstream::Upstream(client::Options options, Handlers handlers)
       link_(std::move(options),
             {.up = [this](v1::HelloReply daemon,
                           bool same_machine) { on_up(std::move(daemon), same_machine); },
-             .down = handlers_.notice,
+             .down = [this](const std::string& reason) { on_down(reason); },
              .message = [this](const std::string& bytes) { on_message(bytes); }}) {}
 
 void Upstream::want(const v1::Subscribe& subscription) {
@@ -35,17 +35,31 @@ v1::HelloReply Upstream::daemon() const {
   return daemon_;
 }
 
+std::string Upstream::away() const {
+  const std::lock_guard lock(mutex_);
+  return away_;
+}
+
 void Upstream::on_up(v1::HelloReply daemon, bool same_machine) {
   const std::string program = daemon.program();
   {
     const std::lock_guard lock(mutex_);
     daemon_ = std::move(daemon);
+    away_.clear();
     newest_.part();
     // Raw values cost least where they need not travel.
     compressed_ = !same_machine;
     subscribe();
   }
   handlers_.notice("connected to " + program + " at " + host_);
+}
+
+void Upstream::on_down(const std::string& reason) {
+  {
+    const std::lock_guard lock(mutex_);
+    away_ = reason;
+  }
+  handlers_.notice(reason);
 }
 
 /// Under the mutex, so that what is wanted last is said last. Lost while the daemon is away:

@@ -31,9 +31,12 @@ class Upstream {
   [[nodiscard]] std::optional<NewestFrame::Taken> take();
   /// What the daemon last said of itself; empty before it was reached.
   [[nodiscard]] v1::HelloReply daemon() const;
+  /// Why the daemon is away; empty while it is connected.
+  [[nodiscard]] std::string away() const;
 
  private:
   void on_up(v1::HelloReply daemon, bool same_machine);
+  void on_down(const std::string& reason);
   void on_message(const std::string& bytes);
   void subscribe();
 
@@ -44,6 +47,7 @@ class Upstream {
   bool compressed_ = false;  ///< Depth, since it travels.
   NewestFrame newest_;
   v1::HelloReply daemon_;
+  std::string away_ = "the daemon is not connected yet";
   cli::Link link_;  ///< Last: its thread uses the others.
 };
 

@@ -1,16 +1,21 @@
-// dtact-perceive's server with a daemon that a test plays.
+// dtact-perceive's server with a daemon that a test plays, or with none.
 #include "clients/perceive/server.hpp"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/post.hpp>
 #include <chrono>
 #include <functional>
+#include <mutex>
+#include <sstream>
 #include <string>
 #include <thread>
 
 #include "clients/cpp/client.hpp"
+#include "clients/perceive/perceive.hpp"
 #include "tests/unit/client/played_daemon.hpp"
 
 namespace dtact::perceive {
@@ -19,6 +24,7 @@ namespace {
 using client::test::kLong;
 using client::test::Peer;
 using client::test::PlayedDaemon;
+using testing::HasSubstr;
 
 /// The server on a thread of its own.
 class Running {
@@ -27,6 +33,10 @@ class Running {
     net::NetConfig config;
     config.port = 0;
     config.features = wire::kPerceiveFeatures;
+    config.log = [this](const net::LogLine& line) {
+      const std::scoped_lock lock(mutex_);
+      log_ += line.text + '\n';
+    };
     server_ = std::make_shared<Server>(io_, config, daemon);
     server_->start();
     thread_ = std::thread([this] { io_.run(); });
@@ -43,8 +53,15 @@ class Running {
     options.port = server_->port();
     return client::Client(options);
   }
+  [[nodiscard]] std::uint16_t port() const { return server_->port(); }
+  [[nodiscard]] std::string log() const {
+    const std::scoped_lock lock(mutex_);
+    return log_;
+  }
 
  private:
+  mutable std::mutex mutex_;
+  std::string log_;
   boost::asio::io_context io_;
   std::shared_ptr<Server> server_;
   std::thread thread_;
@@ -59,6 +76,8 @@ v1::Status status_when(client::Client& client, const std::function<bool(const v1
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
   }
 }
+bool serves(const v1::Status& status) { return status.state() == v1::STATE_SERVING; }
+
 void greet(Peer& peer) {
   v1::Reply reply;
   v1::HelloReply& hello = *reply.mutable_hello();
@@ -70,6 +89,26 @@ void greet(Peer& peer) {
   peer.answer(std::move(reply));
 }
 
+TEST(Server, SaysThatTheDaemonIsAway) {
+  client::Options nobody;
+  {
+    const PlayedDaemon gone({});
+    nobody = gone.options;
+  }
+  const Running running(nobody);
+  client::Client client = running.connect();
+  const v1::Status status = status_when(
+      client, [](const v1::Status& one) { return one.advice().find("yet") == std::string::npos; });
+  EXPECT_NE(status.state(), v1::STATE_SERVING);
+  EXPECT_THAT(status.advice(), HasSubstr(std::to_string(nobody.port)));
+  std::ostringstream out;
+  std::ostringstream error;
+  EXPECT_EQ(run({"--port", std::to_string(running.port()), "watch", "--seconds", "4"}, out, error),
+            0)
+      << error.str();
+  EXPECT_THAT(out.str(), HasSubstr("no frames: " + status.advice() + "\n"));
+}
+
 TEST(Server, IntroducesItselfWithTheDaemonsNameAndFrame) {
   PlayedDaemon daemon({[](Peer& peer) {
     greet(peer);
@@ -77,14 +116,55 @@ TEST(Server, IntroducesItselfWithTheDaemonsNameAndFrame) {
   }});
   const Running running(daemon.options);
   client::Client first = running.connect();
-  const v1::Status status =
-      status_when(first, [](const v1::Status& one) { return !one.serial().empty(); });
+  const v1::Status status = status_when(first, serves);
+  EXPECT_EQ(status.state(), v1::STATE_SERVING);
+  EXPECT_EQ(status.advice(), "");
   EXPECT_EQ(status.name(), "left");
   EXPECT_EQ(status.serial(), "S7");
   const client::Client client = running.connect();
   EXPECT_EQ(client.server().surface_frame().frame_id(), "left_finger");
   EXPECT_EQ(client.server().name(), "left");
   EXPECT_EQ(client.server().serial(), "S7");
+}
+
+TEST(Server, LogsFramesThatItCannotReadOnce) {
+  constexpr std::uint64_t kFrames = 3;
+  std::atomic<std::uint64_t> wanted = 1;
+  PlayedDaemon daemon({[&wanted](Peer& peer) {
+    greet(peer);
+    peer.done();  // of nothing, as no client is there
+    peer.done();  // of the client
+    for (std::uint64_t sequence = 1; sequence <= kFrames; ++sequence) {
+      while (wanted < sequence) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+      v1::ServerMessage message;
+      v1::Frame& frame = *message.mutable_frame();
+      frame.set_sequence(sequence);
+      frame.mutable_contact()->set_in_contact(false);
+      frame.mutable_depth();
+      frame.mutable_surface()->set_shape(static_cast<v1::Surface::Shape>(9));
+      peer.send(message);
+    }
+    peer.request();  // until the end
+  }});
+  const Running running(daemon.options);
+  client::Client client = running.connect();
+  (void)status_when(client, serves);
+  v1::Subscribe summary;
+  summary.set_summary(true);
+  client.subscribe(summary);
+  v1::Status status;
+  for (std::uint64_t taken = 1; taken <= kFrames; ++taken) {
+    // One after the other, since a newer frame replaces one that waits.
+    status = status_when(client, [=](const v1::Status& one) { return one.frames() >= taken; });
+    wanted = taken + 1;
+  }
+  EXPECT_EQ(status.frames(), kFrames);
+  EXPECT_THAT(status.advice(), HasSubstr("a shape, 9,"));
+  EXPECT_NE(status.state(), v1::STATE_SERVING);
+  const std::string log = running.log();
+  const std::size_t first = log.find("a shape, 9,");
+  EXPECT_NE(first, std::string::npos) << log;
+  EXPECT_EQ(log.find("a shape, 9,", first + 1), std::string::npos) << log;
 }
 
 }  // namespace
