@@ -91,7 +91,9 @@ image::Grey8 picture_of(const v1::DepthMap& depth) {
 
 std::vector<TouchMap> take_presses(const Lesson& lesson, const client::Options& target,
                                    Console& console) {
-  client::Client client(target);
+  client::Options options = target;
+  options.reconnect.emplace();  // the presses so far outlive a restart of the daemon
+  client::Client client(options);
   const v1::Status status = client.status();
   if (!status.has_calibration()) {
     throw std::runtime_error(
@@ -116,6 +118,7 @@ std::vector<TouchMap> take_presses(const Lesson& lesson, const client::Options& 
   Scene scene;
   scene.presses_required = lesson.presses;
   PressTaker taker;
+  int silent = 0;  // waits without a frame, one after the other
   while (static_cast<int>(presses.size()) < lesson.presses) {
     const Typed typed = console.typed();
     if (typed.kind == Typed::Kind::interrupted || typed.line == kQuit.key) {
@@ -127,7 +130,14 @@ std::vector<TouchMap> take_presses(const Lesson& lesson, const client::Options& 
     }
     const auto item = client.next(std::chrono::milliseconds(200));
     const auto* frame = item ? std::get_if<v1::Frame>(&*item) : nullptr;
-    if (frame == nullptr) continue;
+    if (frame == nullptr) {
+      constexpr int kSilent = 10;
+      if (++silent == kSilent) {
+        console.say("no frames come from the daemon: the presses so far are kept until they do");
+      }
+      continue;
+    }
+    silent = 0;
     if (const auto press = taker.add(*frame)) {
       presses.push_back(*press);
       scene.presses.push_back(

@@ -23,8 +23,9 @@ struct Lesson {
 };
 
 /// Takes one map of each press, the first one at rest, from the running daemon and stores them all
-/// at the end; earlier ones of this name are replaced. Says then what each press would be taken for
-/// without itself. Throws as client::Client, and std::runtime_error where the user ends it early.
+/// at the end; earlier ones of this name are replaced. Waits for a daemon that goes away meanwhile.
+/// Says then what each press would be taken for without itself. Throws as client::Client, and
+/// std::runtime_error where the user ends it early.
 void teach(const Lesson& lesson, const client::Options& target, ctl::guided::Console& console);
 
 }  // namespace dtact::objects

@@ -1,5 +1,5 @@
-// dtact-calibrate objects: evaluate on drawn presses of a ball and of a plate's corner; a folder of
-// taught objects with damaged files.
+// dtact-calibrate objects: evaluate on drawn presses of a ball and of a plate's corner; a lesson; a
+// folder of taught objects with damaged files.
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "clients/calibrate/calibrate.hpp"
+#include "clients/calibrate/objects/teaching.hpp"
 #include "clients/common/depth_file.hpp"
 #include "clients/perceive/recognition/taught_objects.hpp"
 #include "clients/recording/recording_writer.hpp"
@@ -20,6 +21,7 @@
 #include "hal/files/mcap_file_sink.hpp"
 #include "hal/files/png.hpp"
 #include "tests/unit/calibration/sample.hpp"
+#include "tests/unit/client/played_daemon.hpp"
 
 namespace dtact::objects {
 namespace {
@@ -52,6 +54,23 @@ std::vector<float> map_of(const Shape& shape, int x, int y) {
   return mm;
 }
 
+v1::DepthMap message_of(const std::vector<float>& mm) {
+  v1::DepthMap map;
+  map.set_encoding(v1::DEPTH_INT16);
+  map.set_width(kWidth);
+  map.set_height(kHeight);
+  map.set_full_width(kWidth);
+  map.set_full_height(kHeight);
+  map.set_mm_per_px(kMmPerPx);
+  map.set_um_per_unit(1);
+  for (const float value : mm) {
+    const auto um = static_cast<unsigned>(std::lround(1000 * value));
+    map.mutable_data()->push_back(static_cast<char>(um & 0xFFU));
+    map.mutable_data()->push_back(static_cast<char>(um >> 8U));
+  }
+  return map;
+}
+
 class Evaluate : public testing::Test {
  protected:
   [[nodiscard]] std::string at(const std::string& name) const {
@@ -75,19 +94,7 @@ class Evaluate : public testing::Test {
         frame.set_wall_ns(static_cast<std::int64_t>(sequence) * 16'666'667);
         frame.set_monotonic_ns(frame.wall_ns());
         frame.mutable_contact()->set_in_contact(i < 18);
-        v1::DepthMap& map = *frame.mutable_depth();
-        map.set_encoding(v1::DEPTH_INT16);
-        map.set_width(kWidth);
-        map.set_height(kHeight);
-        map.set_full_width(kWidth);
-        map.set_full_height(kHeight);
-        map.set_mm_per_px(kMmPerPx);
-        map.set_um_per_unit(1);
-        for (const float value : mm) {
-          const auto um = static_cast<unsigned>(std::lround(1000 * value));
-          map.mutable_data()->push_back(static_cast<char>(um & 0xFFU));
-          map.mutable_data()->push_back(static_cast<char>(um >> 8U));
-        }
+        *frame.mutable_depth() = message_of(mm);
         writer.add(frame);
       }
     }
@@ -171,6 +178,48 @@ TEST_F(Evaluate, WhatItCannotUseIsNamed) {
                               cli::npy_head("(3,)") + cli::npy_values(std::vector<float>{1, 2, 3}));
   EXPECT_NE(run({"--mm-per-px", "0.1668"}), 0);
   EXPECT_THAT(said_, HasSubstr(at("presses/ball/1.npy") + ": is no depth map"));
+}
+
+class Silent : public ctl::guided::Console {
+ public:
+  [[nodiscard]] bool interactive() const override { return false; }
+  [[nodiscard]] ctl::guided::Typed typed() override { return {}; }
+  [[nodiscard]] bool interrupted() const override { return false; }
+  void say(const std::string&) override {}
+  void keep(const image::Grey8&) override {}
+  void live(const ctl::guided::Scene&) override {}
+};
+
+TEST(Teaching, KeepsThePressesWhileTheDaemonRestarts) {
+  const auto press = [](client::test::Peer& peer, int x) {
+    v1::ServerMessage message;
+    v1::Frame& frame = *message.mutable_frame();
+    frame.mutable_contact()->set_in_contact(true);
+    *frame.mutable_depth() = message_of(map_of(ball(4), x, 40));
+    for (int i = 0; i < 10; ++i) peer.send(message);
+    frame.mutable_contact()->set_in_contact(false);
+    peer.send(message);
+  };
+  client::test::PlayedDaemon daemon(
+      {[&](client::test::Peer& peer) {
+         peer.greet();
+         v1::Reply status;
+         status.mutable_status()->mutable_calibration()->set_mm_per_px(kMmPerPx / 4);
+         peer.answer(status);
+         peer.done();
+         press(peer, 50);
+         press(peer, 71);
+       },
+       [&](client::test::Peer& peer) {
+         peer.greet();
+         peer.done();
+         press(peer, 60);
+         peer.request();  // until the end
+       }});
+  const calibration::TempFolder temp;
+  Silent console;
+  teach({.folder = temp.path(), .name = "lid", .presses = 3}, daemon.options, console);
+  EXPECT_EQ(perceive::read_presses(temp.path(), "lid").size(), 3U);
 }
 
 TEST(TaughtObjects, ADamagedFileIsListedAndForgotten) {
