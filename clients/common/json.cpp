@@ -5,8 +5,9 @@
 #include <openssl/evp.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
+
+#include "hal/base/utf8.hpp"
 
 namespace dtact::cli {
 namespace {
@@ -15,23 +16,6 @@ using google::protobuf::EnumValueDescriptor;
 using google::protobuf::FieldDescriptor;
 using google::protobuf::Message;
 using google::protobuf::Reflection;
-
-/// The number of bytes of the code point that `text` begins with; 0: it begins with none.
-std::size_t code_point_size(std::string_view text) {
-  constexpr std::array<std::uint32_t, 5> kSmallest{0, 0, 0x80, 0x800, 0x10000};
-  const auto lead = static_cast<unsigned char>(text.front());
-  if (lead < 0x80) return 1;
-  const std::size_t size = lead < 0xc0 ? 0 : lead < 0xe0 ? 2 : lead < 0xf0 ? 3 : 4;
-  if (size == 0 || lead >= 0xf8 || size > text.size()) return 0;
-  std::uint32_t code = lead & (0x7fU >> size);
-  for (const char sign : text.substr(1, size - 1)) {
-    const auto byte = static_cast<unsigned char>(sign);
-    if ((byte & 0xc0U) != 0x80) return 0;
-    code = code << 6U | (byte & 0x3fU);
-  }
-  const bool surrogate = code >= 0xd800 && code < 0xe000;
-  return code < kSmallest.at(size) || surrogate || code > 0x10ffff ? 0 : size;
-}
 
 template <class Number>
 std::string number(Number value) {
@@ -106,7 +90,7 @@ std::string json_line(const Message& message) { return object(message) + '\n'; }
 std::string json_string(std::string_view text) {
   std::string json = "\"";
   while (!text.empty()) {
-    const std::size_t size = code_point_size(text);
+    const std::size_t size = base::character_size(text);
     const char sign = text.front();
     if (size == 0) {
       json += "\xef\xbf\xbd";

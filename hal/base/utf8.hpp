@@ -17,25 +17,30 @@ inline std::string first_bytes(const std::string& text, std::size_t most) {
   return text.substr(0, end);
 }
 
-/// Whether the text can be a protobuf `string`: no cut or overlong character, no half of a pair,
-/// nothing above U+10FFFF (Unicode 15, table 3-7).
+/// Number of bytes of the character that the text begins with; 0: it begins with none. No cut or
+/// overlong character, no half of a pair, nothing above U+10FFFF (Unicode 15, table 3-7).
+inline std::size_t character_size(std::string_view text) {
+  const auto byte_at = [&](std::size_t at) {
+    return at < text.size() ? static_cast<unsigned char>(text[at]) : 0U;
+  };
+  const unsigned first = byte_at(0);
+  const std::size_t size = first < 0x80 ? 1 : first < 0xE0 ? 2 : first < 0xF0 ? 3 : 4;
+  if (text.empty() || (first >= 0x80 && first < 0xC2) || first > 0xF4) return 0;
+  for (std::size_t i = 1; i < size; ++i) {
+    if ((byte_at(i) & 0xC0U) != 0x80U) return 0;
+  }
+  const unsigned second = byte_at(1);
+  const bool outside = (first == 0xE0 && second < 0xA0) || (first == 0xED && second > 0x9F) ||
+                       (first == 0xF0 && second < 0x90) || (first == 0xF4 && second > 0x8F);
+  return outside ? 0 : size;
+}
+
+/// Whether the text can be a protobuf `string`.
 inline bool is_utf8(std::string_view text) {
-  for (std::size_t i = 0; i < text.size();) {
-    const auto byte_at = [&](std::size_t at) {
-      return at < text.size() ? static_cast<unsigned char>(text[at]) : 0U;
-    };
-    const unsigned first = byte_at(i);
-    const std::size_t length = first < 0x80 ? 1 : first < 0xE0 ? 2 : first < 0xF0 ? 3 : 4;
-    if ((first >= 0x80 && first < 0xC2) || first > 0xF4) return false;
-    for (std::size_t k = 1; k < length; ++k) {
-      if ((byte_at(i + k) & 0xC0U) != 0x80U) return false;
-    }
-    const unsigned second = byte_at(i + 1);
-    if ((first == 0xE0 && second < 0xA0) || (first == 0xED && second > 0x9F) ||
-        (first == 0xF0 && second < 0x90) || (first == 0xF4 && second > 0x8F)) {
-      return false;
-    }
-    i += length;
+  while (!text.empty()) {
+    const std::size_t size = character_size(text);
+    if (size == 0) return false;
+    text.remove_prefix(size);
   }
   return true;
 }
