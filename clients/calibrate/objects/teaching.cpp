@@ -214,12 +214,11 @@ TouchMap touch_map_of(const v1::DepthMap& depth) {
 }
 
 std::string fault_of(const TouchMap& press) {
-  constexpr double kMinDeepestMm = 0.3;
-  constexpr double kMaxCut = 1;
-  if (press.deepest_mm < kMinDeepestMm) {
-    return fmt::format("Press deeper: at least {} mm", kMinDeepestMm);
+  if (press.deepest_mm < TouchMap::kMinDeepestMm) {
+    return fmt::format("Press deeper: at least {} mm", TouchMap::kMinDeepestMm);
   }
-  return press.cut > kMaxCut ? "Press nearer to the middle: most of it is outside the map" : "";
+  return press.cut > TouchMap::kMaxCut ? "Press nearer to the middle: most of it is outside the map"
+                                       : "";
 }
 
 void teach(const Lesson& lesson, const client::Options& target, Console& console) {

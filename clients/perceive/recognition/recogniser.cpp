@@ -18,10 +18,6 @@ extern const char model_end[] asm("dtact_model_end");
 namespace dtact::perceive {
 namespace {
 
-/// Shallower presses look alike.
-constexpr double kMinDeepestMm = 0.3;
-/// TouchMap::cut of a contact that may be of anything.
-constexpr double kCut = 1;
 /// Least probability of a known object's name.
 constexpr double kSure = 0.6;
 /// Least probability of another shape for "unknown".
@@ -83,7 +79,7 @@ void Evidence::add(const TouchMap& map, const Network::Output& output) {
 }
 
 void Evidence::release() {
-  if (now_.deepest_mm >= kMinDeepestMm) before_.push_back(now_);
+  if (now_.deepest_mm >= TouchMap::kMinDeepestMm) before_.push_back(now_);
   if (before_.size() > kMaxPresses) before_.pop_front();
   now_ = {};
 }
@@ -115,7 +111,7 @@ Recognised Evidence::result(int presses) const {
   Recognised found;
   if (now_.frames == 0) return found;
   std::vector<const Press*> joined;
-  const bool shallow = now_.deepest_mm < kMinDeepestMm;
+  const bool shallow = now_.deepest_mm < TouchMap::kMinDeepestMm;
   if (!shallow) {
     joined.push_back(&now_);
     for (auto press = before_.rbegin();
@@ -146,7 +142,7 @@ Recognised Evidence::result(int presses) const {
     found.verdict = Verdict::too_shallow;
   } else if (found.candidates.front().probability >= kSure) {
     found.verdict = Verdict::known;
-  } else if (now_.cut > kCut && found.probabilities.back() < kSurelyOther) {
+  } else if (now_.cut > TouchMap::kMaxCut && found.probabilities.back() < kSurelyOther) {
     found.verdict = Verdict::cut_off;
   } else {
     found.verdict = found.probabilities.back() >= kOther ? Verdict::unknown : Verdict::unsure;

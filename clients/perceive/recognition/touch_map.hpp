@@ -18,6 +18,8 @@ struct TouchMap {
   /// Length of the depth map's border that is in contact, as a share of the square root of the
   /// area: 0 for a whole contact, 1.6 for a disc of which half is seen.
   double cut = 0;
+  static constexpr double kMinDeepestMm = 0.3;  ///< Shallower presses look alike.
+  static constexpr double kMaxCut = 1;  ///< A contact with a larger `cut` may be of anything.
   static constexpr float kMinMm = -1;
   static constexpr float kMaxMm = 3;
 };
