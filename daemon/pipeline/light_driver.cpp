@@ -14,6 +14,7 @@ constexpr std::int64_t kRetryNs = 5'000'000;
 LightDriver::LightDriver(std::unique_ptr<hal::LightRing> ring, const hal::Light& light,
                          base::Clock& clock, const Exchange& exchange, hal::Camera* camera)
     : ring_(std::move(ring)),
+      info_(ring_->info()),
       clock_(clock),
       exchange_(exchange),
       camera_(camera),
@@ -146,10 +147,24 @@ std::chrono::nanoseconds LightDriver::attend() {
   // A ring that never re-sends knows nothing of how it is.
   if (report.away || (report.writes > 0 && report.ok == trouble_)) {
     trouble_ = !report.ok;
-    const std::scoped_lock lock(mutex_);
-    message_ = report.message;
+    {
+      const std::scoped_lock lock(mutex_);
+      message_ = report.message;
+    }
+    if (report.ok && !shown_ns_) recover();
   }
   return report.due;
+}
+
+// Until this re-send the LEDs may have shown the light that failed, the one before, or a mixture.
+void LightDriver::recover() {
+  const std::int64_t now_ns = clock_.monotonic_ns();
+  note({.begins = true, .at_ns = now_ns, .light = light()});
+  {
+    const std::scoped_lock lock(mutex_);
+    shown_ns_ = now_ns;
+  }
+  note({.begins = false, .at_ns = now_ns, .light = light(), .returned = true});
 }
 
 void LightDriver::come_back() {

@@ -22,9 +22,10 @@ struct LightNote {
   bool begins = false;     ///< The write is about to begin; else it is over.
   std::int64_t at_ns = 0;  ///< CLOCK_MONOTONIC.
   hal::Light light;        ///< What the ring is to show, or shows.
-  bool returned = false;   ///< The ring was away until this write: what it showed is not known.
-  bool failed = false;     ///< The write did not work.
-  bool camera = false;     ///< The ring stays: the camera's exposure or gain is written.
+  /// The ring was away, or its last write failed, until this one: what it showed is not known.
+  bool returned = false;
+  bool failed = false;  ///< The write did not work.
+  bool camera = false;  ///< The ring stays: the camera's exposure or gain is written.
 };
 
 /// Owns the ring and the one thread that uses it: it writes, re-sends and executes commands, since
@@ -54,7 +55,7 @@ class LightDriver {
   /// A SetLight or a SetCamera.
   [[nodiscard]] bool submit(Command command);
   [[nodiscard]] bool next_event(Event& out) { return events_.pop(out); }
-  [[nodiscard]] hal::RingInfo info() const { return ring_->info(); }
+  [[nodiscard]] const hal::RingInfo& info() const { return info_; }
   /// The last error, or why the ring shows less light than requested, or another remark on it;
   /// empty when well.
   [[nodiscard]] std::string message() const;
@@ -74,12 +75,14 @@ class LightDriver {
   void set_camera(Command command);
   std::chrono::nanoseconds attend();
   void come_back();
+  void recover();
   hal::ShowResult write(const hal::Light& light);
   void note(const LightNote& note);
   void emit(const Event& event);
   [[nodiscard]] LightChanged changed() const;
 
   std::unique_ptr<hal::LightRing> ring_;
+  const hal::RingInfo info_;
   base::Clock& clock_;
   const Exchange& exchange_;
   hal::Camera* const camera_;

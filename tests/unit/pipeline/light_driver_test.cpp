@@ -144,6 +144,28 @@ TEST_F(LightDriverTest, AReSendThatFailsIsAConditionUntilItHeals) {
   EXPECT_TRUE(eventually([&] { return !driver.trouble() && driver.message().empty(); }));
 }
 
+// The LEDs may show what failed until the light before it is sent again.
+TEST_F(LightDriverTest, AfterAFailedCommandAReSendThatWorksIsAReturn) {
+  exchange.light_lag_ns = 1000;
+  driver.start();
+  ring.broken = true;
+  ASSERT_TRUE(driver.submit({SetLight{dimmed(100)}}));
+  ASSERT_TRUE(next());
+  EXPECT_EQ(driver.light_since_ns(), std::nullopt);
+  ring.set_report({.ok = true, .message = {}, .note = {}, .writes = 3, .failures = 1});
+  EXPECT_TRUE(eventually([&] { return driver.light_since_ns().has_value(); }));
+  EXPECT_FALSE(driver.trouble());
+  driver.stop();
+  take_notes();
+  ASSERT_EQ(notes.size(), 6U);
+  EXPECT_TRUE(notes[3].failed);
+  EXPECT_TRUE(notes[4].begins);
+  EXPECT_TRUE(notes[5].returned);
+  EXPECT_FALSE(notes[5].failed);
+  EXPECT_EQ(notes[5].light.brightness, 200);
+  EXPECT_EQ(driver.light_since_ns(), notes[5].at_ns + 1000);
+}
+
 TEST_F(LightDriverTest, WhatIsWorthKnowingOfTheRingIsReportedWhileNothingIsWrong) {
   driver.start();
   ring.set_report(
