@@ -31,6 +31,7 @@ void LightDriver::stop() noexcept {
   stop_ = true;
   work_.ring();
   thread_.join();
+  ring_.reset();
 }
 
 bool LightDriver::submit(Command command) {

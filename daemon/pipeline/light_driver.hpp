@@ -48,7 +48,8 @@ class LightDriver {
 
   /// Shows the first light on the calling thread, notifies the capture thread, starts the thread.
   void start();
-  /// Ends and joins the thread, after the write it is in.
+  /// Ends and joins the thread, after the write it is in, and lets the ring go: it turns dark
+  /// unless it stays on by configuration. It does not start again.
   void stop() noexcept;
 
   // Network thread.

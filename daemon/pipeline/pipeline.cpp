@@ -136,8 +136,10 @@ void Pipeline::start() {
 
 void Pipeline::stop() noexcept {
   exchange_.stop = true;
-  capture_.join();
+  // Dark at once: what follows may take longer than a service manager waits. The capture loop ends
+  // with the frame it is at, so no reference is taken in the dark.
   light_.stop();
+  capture_.join();
   loop_->tracker().stop();
 }
 

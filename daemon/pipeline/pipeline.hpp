@@ -30,8 +30,9 @@ class Pipeline final : public Port {
   /// Turns on ring and camera and starts the threads. Call once. Throws std::runtime_error with
   /// the fix when the camera does not start; a ring that fails sets a health flag.
   void start();
-  /// Ends and joins the threads: within a tenth of a second and what the camera's and the ring's
-  /// calls in progress take. The last good reference is written out before it returns.
+  /// Turns the ring dark, then ends and joins the threads: within a tenth of a second and what the
+  /// camera's and the ring's calls in progress take. The last good reference is written out before
+  /// it returns.
   void stop() noexcept;
 
   /// Turns of the capture loop so far: ten a second at least, whatever the camera's state, unless a

@@ -18,6 +18,7 @@ class FakeRing final : public hal::LightRing {
   struct Handle {
     std::atomic<bool> broken{false};
     std::atomic<bool> away{false};
+    std::atomic<bool> released{false};  ///< The ring has been destroyed.
     std::function<void(const hal::Light&)> on_show;
     mutable std::mutex mutex;
     std::vector<hal::Light> shown;
@@ -34,6 +35,9 @@ class FakeRing final : public hal::LightRing {
     }
   };
   explicit FakeRing(Handle& handle) : handle_(handle) {}
+  FakeRing(const FakeRing&) = delete;
+  FakeRing& operator=(const FakeRing&) = delete;
+  ~FakeRing() override { handle_.released = true; }
 
   [[nodiscard]] hal::RingInfo info() const override { return {"fake", "fake ring"}; }
   [[nodiscard]] hal::ShowResult show(const hal::Light& light) override {

@@ -1,7 +1,9 @@
 // The whole pipeline under faults, delays and refusals: what it reports and how it stops.
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <chrono>
+#include <cstdint>
 #include <thread>
 
 #include "tests/unit/pipeline/whole_pipeline.hpp"
@@ -155,6 +157,28 @@ TEST_F(PipelineTest, StopsWhileTheCameraIsSilent) {
   // 0.1 s by design; the margin is for a busy machine.
   EXPECT_LT(std::chrono::steady_clock::now() - began, std::chrono::seconds(5));
   EXPECT_EQ(camera.lent, 0);  // the last frame was released
+}
+
+// The camera's call or the disk may take longer than a service manager waits, which then kills.
+TEST_F(PipelineTest, TheRingIsDarkBeforeACallOfTheCameraComesBack) {
+  std::atomic<bool> stopping{false};
+  std::atomic<bool> blocked{false};
+  std::atomic<bool> dark{false};
+  camera.on_grab = [&](std::uint64_t) {
+    if (!stopping) return;
+    blocked = true;
+    for (int i = 0; i < 1000 && !ring.released; ++i) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    }
+    dark = ring.released.load();
+  };
+  start(fakes::toy_calibration());
+  EXPECT_TRUE(until_fresh());
+  stopping = true;
+  EXPECT_TRUE(until([&] { return blocked.load(); }));
+  pipeline->stop();
+  EXPECT_TRUE(dark);
+  EXPECT_EQ(pipeline->status().ring.identity, "fake ring");
 }
 
 TEST_F(PipelineTest, StopsWithoutHavingStarted) {
