@@ -82,10 +82,12 @@ void LightDriver::run() {
 
 void LightDriver::set_camera(Command command) {
   CommandDone done;
-  note({.begins = true, .at_ns = clock_.monotonic_ns(), .light = light(), .camera = true});
+  note({.begins = true, .at_ns = clock_.monotonic_ns(), .light = light()});
+  bool changed = true;
   try {
     camera_->change(std::get<SetCamera>(command.what).change);
   } catch (const std::exception& e) {
+    changed = false;
     done.outcome = Outcome::device_error;
     done.message = e.what();
   }
@@ -94,7 +96,7 @@ void LightDriver::set_camera(Command command) {
         .at_ns = clock_.monotonic_ns(),
         .light = light(),
         .failed = !shown_ns_.has_value(),
-        .camera = true});
+        .camera = changed});
   done.command = std::move(command);
   emit(done);
 }

@@ -25,7 +25,7 @@ struct LightNote {
   /// The ring was away, or its last write failed, until this one: what it showed is not known.
   bool returned = false;
   bool failed = false;  ///< The write did not work.
-  bool camera = false;  ///< The ring stays: the camera's exposure or gain is written.
+  bool camera = false;  ///< The ring stays: the camera's exposure or gain has been changed.
 };
 
 /// Owns the ring and the one thread that uses it: it writes, re-sends and executes commands, since

@@ -1,11 +1,13 @@
 #pragma once
 
+#include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <memory>
 #include <optional>
+#include <stdexcept>
 #include <utility>
 #include <variant>
 #include <vector>
@@ -30,7 +32,7 @@ class SteppedLoop {
   /// Call it once the configuration is set.
   void begin(const std::shared_ptr<const calibration::Calibration>& calibration,
              bool unusable = false) {
-    light.emplace(std::make_unique<FakeRing>(ring), config.light, clock, exchange);
+    light.emplace(std::make_unique<FakeRing>(ring), config.light, clock, exchange, &camera);
     std::unique_ptr<pipeline::ActiveCalibration> active;
     if (calibration) active = activated(calibration);
     loop.emplace(pipeline::CaptureParts{camera, *light, exchange, clock}, config, std::move(active),
@@ -101,6 +103,9 @@ class SteppedLoop {
     [[nodiscard]] hal::CameraInfo info() const override { return description; }
     [[nodiscard]] hal::CameraReport report() const override { return {}; }
     void start() override {}
+    void change(const hal::CameraChange& /*change*/) override {
+      if (refuses_changes) throw std::runtime_error("the toy refuses");
+    }
     [[nodiscard]] hal::GrabStatus grab(hal::Frame& out,
                                        std::chrono::nanoseconds /*timeout*/) noexcept override {
       owner.clock.now += static_cast<std::int64_t>(1e9 * slower / description.fps);
@@ -120,6 +125,7 @@ class SteppedLoop {
     SteppedLoop& owner;
     hal::CameraInfo description;
     hal::GrabStatus status = hal::GrabStatus::ok;
+    std::atomic<bool> refuses_changes{false};
     ToyScene scene;
     std::uint32_t flags = hal::kFrameNormal;  ///< Flags of the next frame.
     hal::TimestampMeaning meaning = hal::TimestampMeaning::start_of_exposure;

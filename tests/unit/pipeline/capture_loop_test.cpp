@@ -293,6 +293,27 @@ TEST(CaptureLoop, TakesNoReferenceInContactThatNobodyHears) {
   EXPECT_TRUE(loop.health().has(Health::reference_stale));
 }
 
+// A refusal leaves the picture as it was; in contact nothing as good could be taken.
+TEST(CaptureLoop, OnlyAChangeOfTheCameraThatItTakesMakesTheReferenceStale) {
+  SteppedLoop loop;
+  loop.camera.refuses_changes = true;
+  loop.begin(toy_calibration());
+  loop.light->start();
+  ASSERT_TRUE(loop.until_fresh());
+  loop.camera.scene.press_mm = 1;
+  loop.step(10);
+  const auto change = [&] {
+    EXPECT_TRUE(loop.light->submit({SetCamera{{.exposure_us = 5000, .gain = {}}}}));
+    EXPECT_TRUE(loop.until([&] { return loop.health().has(Health::light_unsettled); }, 100'000));
+    EXPECT_TRUE(loop.until([&] { return !loop.health().has(Health::light_unsettled); }));
+  };
+  change();
+  EXPECT_TRUE(loop.health().empty());
+  loop.camera.refuses_changes = false;
+  change();
+  EXPECT_TRUE(loop.health().has(Health::reference_stale));
+}
+
 TEST(CaptureLoop, AnotherCalibrationMeasuresAgainstTheReferenceThatStays) {
   SteppedLoop loop;
   loop.camera.scene.light = 0.9;
