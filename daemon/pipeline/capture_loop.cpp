@@ -117,7 +117,10 @@ void CaptureLoop::process(std::int64_t now_ns) noexcept {
   exchange_.sequence.store(info.sequence, std::memory_order_relaxed);
   exchange_.light_lag_ns.store(timeline_.delay_ns() + stamp_lag_ns(info.meaning, period_ns_),
                                std::memory_order_relaxed);
-  controls_moved_ = (info.flags & hal::kFrameControlsMoved) != 0;
+  const bool moved = (info.flags & hal::kFrameControlsMoved) != 0;
+  // They have just been set back. A reference of the last second may be of what they had moved to.
+  if (moved && !controls_moved_) tracker_.camera_began();
+  controls_moved_ = moved;
   const std::int64_t exposure_ns = exposure_start_ns(info, period_ns_);
 
   DepthFrame& out = exchange_.slot.back();

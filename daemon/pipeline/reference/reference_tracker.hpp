@@ -81,7 +81,8 @@ class ReferenceTracker {
   void restore(std::span<const std::uint16_t> reference_q8, const hal::Light& light);
   /// From now on this calibration; null: none. A fresh reference stays.
   void use(CalibratedImage* image) noexcept;
-  /// The camera has restarted: what was known of its image is in doubt.
+  /// The camera has restarted or its controls were set back: what was known of its image is in
+  /// doubt.
   void camera_began() noexcept;
   /// The timeline's light has changed from `before`.
   void light_changed(const hal::Light& before) noexcept;

@@ -206,6 +206,27 @@ TEST(CaptureLoop, ACameraOpenedAnewBeginsAnew) {
   EXPECT_NEAR(loop.frame->contact.deepest_mm, 0.5, 0.02);
 }
 
+// Another program had changed the exposure, and the reference was taken before it was set back.
+TEST(CaptureLoop, AControlThatIsSetBackBeginsAnewOnce) {
+  SteppedLoop loop;
+  loop.camera.scene.light = 0.8;
+  loop.begin(toy_calibration());
+  ASSERT_TRUE(loop.until_fresh());
+  ASSERT_EQ(loop.all<ReferenceTaken>().size(), 1U);
+  loop.camera.scene.light = 1;
+  for (int i = 0; i < 60; ++i) {  // a second
+    loop.camera.flags = hal::kFrameControlsMoved;
+    loop.step(1);
+  }
+  EXPECT_TRUE(loop.health().has(Health::camera_mismatch));
+  EXPECT_EQ(loop.all<ReferenceTaken>().size(), 2U);
+  loop.step(100);
+  EXPECT_TRUE(loop.health().empty());
+  loop.camera.scene.press_mm = 0.5;
+  loop.step(10);
+  EXPECT_NEAR(loop.frame->contact.deepest_mm, 0.5, 0.02);
+}
+
 TEST(CaptureLoop, EveryFrameReportsTheForceThatTheCalibrationKnows) {
   auto calibration = toy_calibration();
   auto model = std::make_shared<recon::Model>(*calibration->model);
