@@ -91,8 +91,8 @@ struct CameraReport {
   std::uint64_t skipped = 0;
   std::uint64_t damaged = 0;  ///< Truncated or undecodable payloads.
   DamageCounts damage;        ///< The same by cause.
-  /// Why the newest undecodable payload could not be decoded, without a full stop; empty when there
-  /// was none.
+  /// Why the newest damaged payload could not be decoded, without a full stop; empty when it was
+  /// damaged otherwise, or there was none.
   std::string damage_reason;
   std::uint64_t disconnects = 0;  ///< Times the device went away.
   /// Controls that moved by themselves within the last seconds, and were set again; empty when

@@ -20,7 +20,8 @@ constexpr std::int64_t kMillisecond = 1'000'000;
 constexpr std::int64_t kRetry = 100 * kMillisecond;
 /// From the start of the stream to its first frame cameras take up to this long; it isn't a stall.
 constexpr std::int64_t kFirstFrame = 1000 * kMillisecond;
-/// A stalled camera is closed and opened anew after this long: many come back by it.
+/// A camera that sends nothing usable is closed and opened anew after this long: many come back by
+/// it.
 constexpr std::int64_t kReopenAfter = 3000 * kMillisecond;
 constexpr std::chrono::seconds kWatchPeriod{1};
 /// Buffers looked at in one call: they go back as others come out, so there could be no end.
@@ -131,7 +132,7 @@ void LiveCamera::connect() {
   if (!wrong.empty()) throw ModeError(wrong);
   auto fresh = std::make_shared<Connection>(opened.source, decode_scale_);
   if (area_) fresh->decoder.will_read(*area_);
-  opened_ns_ = now_ns();
+  opened_ns_ = delivered_ns_ = now_ns();
   last_buffer_ns_ = 0;
   last_counted_.reset();
   buffers_free_ = opened.source->queued();
@@ -150,7 +151,10 @@ void LiveCamera::connect() {
   info_.pixel_format = std::move(opened.pixel_format);
   info_.controls = std::move(opened.controls);
   info_.settings = opened.settings;
-  fix_ = "the camera has been opened; its first frame is awaited";
+  // A restart alone does not change what a stalled camera needs.
+  if (state_.load() != CameraState::stalled) {
+    fix_ = "the camera has been opened; its first frame is awaited";
+  }
   leases_.use(opened.source);
   connection_ = std::move(fresh);
 }
@@ -221,6 +225,7 @@ GrabStatus LiveCamera::grab(Frame& out, std::chrono::nanoseconds timeout) noexce
       case Collected::frame:
         return GrabStatus::ok;
       case Collected::damaged:
+        note_damage(now_ns());
         return GrabStatus::damaged;
       case Collected::lost:
         lose("was unplugged or its driver failed");
@@ -278,9 +283,6 @@ LiveCamera::Collected LiveCamera::collect(Frame& out) noexcept {
         note_delivery();
       } else {
         count_damage(status);
-        if (status == PayloadStatus::undecodable) {
-          damage_reason_.store(connection_->decoder.damage());
-        }
       }
       damaged = damaged || !done;
       if (kept) continue;
@@ -325,6 +327,7 @@ FrameInfo LiveCamera::facts_of(const FilledBuffer& filled, std::uint64_t sequenc
 void LiveCamera::note_delivery() noexcept {
   after_gap_ = false;
   reopened_ = false;
+  delivered_ns_ = last_buffer_ns_;
   add(counters_.delivered);
   if (state_.load(std::memory_order_relaxed) == CameraState::streaming) return;
   const std::lock_guard guard(mutex_);
@@ -348,6 +351,8 @@ void LiveCamera::count_gap(std::uint32_t counted) noexcept {
 }
 
 void LiveCamera::count_damage(PayloadStatus status) noexcept {
+  damage_reason_.store(status == PayloadStatus::undecodable ? connection_->decoder.damage()
+                                                            : nullptr);
   switch (status) {
     case PayloadStatus::flagged:
       return add(counters_.flagged);
@@ -373,19 +378,29 @@ std::int64_t LiveCamera::tolerated_silence_ns() const noexcept {
 void LiveCamera::note_silence(std::int64_t now) noexcept {
   const std::int64_t silent = silence_ns(now);
   if (silent < tolerated_silence_ns()) return;
-  if (state_.load() != CameraState::stalled) {
-    const std::lock_guard guard(mutex_);
-    state_.store(CameraState::stalled);
-    try {
-      fix_ = fmt::format(
-          "{} is attached but sends nothing: it is restarted every {} s; if that "
-          "doesn't help, plug it in again",
-          info_.identity, kReopenAfter / 1'000'000'000);
-    } catch (const std::exception&) {
-      fix_.clear();
-    }
+  if (state_.load() != CameraState::stalled) stall("sends nothing");
+  if (silent >= kReopenAfter) restart(now);
+}
+
+void LiveCamera::note_damage(std::int64_t now) noexcept {
+  if (now - delivered_ns_ < std::max(kReopenAfter, stall_ns(period_ns_))) return;
+  stall("sends damaged frames only");
+  restart(now);
+}
+
+void LiveCamera::stall(const char* what) noexcept {
+  const std::lock_guard guard(mutex_);
+  state_.store(CameraState::stalled);
+  try {
+    fix_ = fmt::format(
+        "{} is attached but {}: it is restarted every {} s; if that doesn't help, plug it in again",
+        info_.identity, what, kReopenAfter / 1'000'000'000);
+  } catch (const std::exception&) {
+    fix_.clear();
   }
-  if (silent < kReopenAfter) return;
+}
+
+void LiveCamera::restart(std::int64_t now) noexcept {
   std::shared_ptr<Connection> old;
   {
     const std::lock_guard guard(mutex_);

@@ -62,6 +62,9 @@ class LiveCamera : public Camera {
   [[nodiscard]] std::int64_t silence_ns(std::int64_t now_ns) const noexcept;
   [[nodiscard]] std::int64_t tolerated_silence_ns() const noexcept;
   void note_silence(std::int64_t now_ns) noexcept;
+  void note_damage(std::int64_t now_ns) noexcept;
+  void stall(const char* what) noexcept;
+  void restart(std::int64_t now_ns) noexcept;
   /// What collect() found in the driver's queue.
   enum class Collected : std::uint8_t { frame, damaged, nothing, lost };
   [[nodiscard]] Collected collect(Frame& out) noexcept;
@@ -84,6 +87,7 @@ class LiveCamera : public Camera {
   std::int64_t next_try_ns_ = 0;
   std::int64_t last_buffer_ns_ = 0;  // the last sign of life, damaged or not
   std::int64_t opened_ns_ = 0;
+  std::int64_t delivered_ns_ = 0;              // the last whole frame, or the opening
   std::uint64_t sequence_ = 0;                 // of the last buffer, never going back
   std::optional<std::uint32_t> last_counted_;  // the driver's count of the last buffer
   int buffers_free_ = 0;          // with the driver when its queue was last found empty

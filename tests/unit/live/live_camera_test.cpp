@@ -51,6 +51,7 @@ class LeasingSource final : public Source {
     out.payload = std::span(memory[static_cast<std::size_t>(out.index)]).first(bytes);
     out.sequence = sequence++;
     out.timestamp_ns = base::system_clock().monotonic_ns();
+    out.flagged = flagged;
     return DequeueStatus::filled;
   }
   [[nodiscard]] int queued() const noexcept override {
@@ -91,6 +92,7 @@ class LeasingSource final : public Source {
   std::size_t bytes = kPixels;  // of every payload
   bool full_range = true;
   bool broken = false;
+  bool flagged = false;  // every payload: it is damaged
   bool stopped = false;
   std::atomic<bool> moved{false};  // asked for by another thread
   std::shared_ptr<bool> destroyed = std::make_shared<bool>(false);
@@ -390,6 +392,33 @@ TEST(LiveCamera, SilenceIsAStallAndIsRestarted) {
   }
   EXPECT_TRUE(rig.source->stopped);
   EXPECT_NE(status, GrabStatus::ok);
+}
+
+// A frame format that slipped, or a cable after a disturbance: many come back by a restart.
+TEST(LiveCamera, DamagedFramesOnlyAreAStallAndAreRestarted) {
+  Rig rig;
+  rig.camera.start();
+  const std::shared_ptr<LeasingSource> damaged = rig.source;
+  Frame frame;
+  damaged->fill(0, 50);
+  ASSERT_EQ(rig.camera.grab(frame, milliseconds(100)), GrabStatus::ok);
+  damaged->flagged = true;
+  rig.source = std::make_shared<LeasingSource>();        // opened next
+  for (int i = 0; i < 3000 && !damaged->stopped; ++i) {  // restarted after three seconds
+    damaged->fill(1, 60);
+    EXPECT_EQ(rig.camera.grab(frame, milliseconds(100)), GrabStatus::damaged);
+    base::system_clock().sleep_until(base::system_clock().monotonic_ns() + 10'000'000);
+  }
+  EXPECT_TRUE(damaged->stopped);
+  EXPECT_EQ(rig.camera.grab(frame, milliseconds(20)), GrabStatus::timeout);
+  EXPECT_EQ(rig.camera.report().state, CameraState::stalled);
+  EXPECT_NE(rig.camera.report().fix.find("sends damaged frames only"), std::string::npos)
+      << "it is open again, and nothing is better yet";
+  rig.source->fill(2, 70);
+  ASSERT_EQ(rig.camera.grab(frame, milliseconds(100)), GrabStatus::ok);
+  EXPECT_EQ(frame.info().flags, kFrameAfterGap | kFrameReopened);
+  EXPECT_EQ(rig.camera.report().state, CameraState::streaming);
+  EXPECT_EQ(rig.camera.report().fix, "");
 }
 
 TEST(LiveCamera, ASlowCamerasFirstFrameIsWaitedFor) {

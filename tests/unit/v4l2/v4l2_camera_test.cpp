@@ -176,6 +176,7 @@ TEST(V4l2Camera, AnUndecodableJpegIsCountedByItsCause) {
   buffer.payload = {0xFF, 0xD8, 0x00, 0xFF, 0xD9};  // both markers, nothing in between
   device.deliver(buffer);
   EXPECT_EQ(camera.grab(frame, milliseconds(1000)), GrabStatus::damaged);
+  EXPECT_EQ(camera.report().damage_reason, "the payload's coded data is broken");
   buffer.payload = {0xFF, 0xD8, 0xFF, 0xDB, 0x00, 0x43};
   device.deliver(buffer);
   EXPECT_EQ(camera.grab(frame, milliseconds(1000)), GrabStatus::damaged);
@@ -185,7 +186,7 @@ TEST(V4l2Camera, AnUndecodableJpegIsCountedByItsCause) {
   const DamageCounts damage = camera.report().damage;
   EXPECT_EQ(damage.undecodable + damage.markers, 2U);
   EXPECT_EQ(damage.too_short, 1U);
-  EXPECT_EQ(camera.report().damage_reason, "the payload's coded data is broken");
+  EXPECT_EQ(camera.report().damage_reason, "") << "the newest was not even decoded";
 }
 
 TEST(V4l2Camera, AModeTheDriverBendsIsAnErrorThatNamesTheOffer) {
