@@ -209,7 +209,7 @@ void ReferenceKeeper::watch(const hal::LumaView& luma) noexcept {
 }
 
 ReferenceStep ReferenceKeeper::take() noexcept {
-  forced_ = request_ && request_->force && shows_contact(candidate_grid_);
+  forced_ = is_doubtful();
   std::swap(good_, candidate_);
   good_grid_ = candidate_grid_;
   have_good_ = true;
@@ -267,17 +267,34 @@ ReferenceStep ReferenceKeeper::use_fallback() noexcept {
   return {.reference_changed = true, .answer = std::nullopt};
 }
 
+/// Whether the candidate may show an object although it is taken.
+bool ReferenceKeeper::is_doubtful() noexcept {
+  // A client that does not force says that there is no contact.
+  if (request_ && !request_->force) return false;
+  // A reference that was forced in contact is no witness against it.
+  if (forced_) return calibration_shows_contact(candidate_grid_);
+  return request_ && shows_contact(candidate_grid_);
+}
+
+float ReferenceKeeper::contact_limit() const noexcept {
+  if (no_contact_before_) return kContactAfterNoContact;
+  return other_light_ ? kContactUnderOtherLight : kContactDarkening;
+}
+
 bool ReferenceKeeper::shows_contact(const LumaGrid& now) noexcept {
-  float limit = other_light_ ? kContactUnderOtherLight : kContactDarkening;
-  if (no_contact_before_) limit = kContactAfterNoContact;
   // One witness is enough: the last good reference may be from before a wear of the gel, the
   // calibration's from before a change of the light's shape.
   if (have_good_ &&
-      check_.compare(good_grid_, now, region_, ContactCheck::kAnyShape, field_).darkening < limit) {
+      check_.compare(good_grid_, now, region_, ContactCheck::kAnyShape, field_).darkening <
+          contact_limit()) {
     return false;
   }
+  return calibration_shows_contact(now);
+}
+
+bool ReferenceKeeper::calibration_shows_contact(const LumaGrid& now) noexcept {
   return check_.compare(*calibration_.grid, now, region_, ContactCheck::kAnyShape, field_)
-             .darkening >= limit;
+             .darkening >= contact_limit();
 }
 
 ReferenceKeeper::Known ReferenceKeeper::best_known() const noexcept {

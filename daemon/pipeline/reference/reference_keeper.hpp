@@ -116,7 +116,10 @@ class ReferenceKeeper {
   ReferenceStep decide(Outcome obstacle) noexcept;
   ReferenceStep take() noexcept;
   ReferenceStep use_fallback() noexcept;
+  [[nodiscard]] bool is_doubtful() noexcept;
+  [[nodiscard]] float contact_limit() const noexcept;
   [[nodiscard]] bool shows_contact(const LumaGrid& now) noexcept;
+  [[nodiscard]] bool calibration_shows_contact(const LumaGrid& now) noexcept;
   [[nodiscard]] Known best_known() const noexcept;
 
   int width_;
@@ -135,7 +138,7 @@ class ReferenceKeeper {
   bool no_contact_before_ = false;  // there was no contact right before the light changed
   bool other_light_ = false;        // the light differs from that of the known images
   bool same_shape_ = true;          // the light differs from it by a factor only
-  bool forced_ = false;
+  bool forced_ = false;             // the last good reference may show an object
   std::optional<Request> request_;
   int waited_ = 0;       // frames since the sequence or the average began
   int dark_frames_ = 0;  // in a row, while no reference is in use

@@ -256,6 +256,27 @@ TEST_F(KeeperTest, ForcedRezeroTakesTheImageInContactButDoesNotKeepIt) {
   EXPECT_TRUE(keeper.storable());
 }
 
+// The object rests on while the camera is plugged in again: the image is like the forced one.
+TEST_F(KeeperTest, AReferenceThatFollowsAForcedOneInContactIsNotKeptEither) {
+  calibrate();
+  ASSERT_TRUE(run(40));
+  scene.press_mm = 1;
+  EXPECT_EQ(keeper.rezero(true, true), std::nullopt);
+  ASSERT_TRUE(run(40));
+  EXPECT_EQ(keeper.rezero(true, true), std::nullopt);
+  ASSERT_TRUE(run(40));
+  EXPECT_FALSE(keeper.storable()) << "forced twice";
+  keeper.begin();
+  ASSERT_TRUE(run(60));
+  EXPECT_EQ(keeper.quality(), ReferenceQuality::fresh);
+  EXPECT_FALSE(keeper.storable());
+  scene.press_mm = 0;
+  keeper.light_changed(false, true);
+  ASSERT_TRUE(run(60));
+  EXPECT_EQ(keeper.quality(), ReferenceQuality::fresh);
+  EXPECT_TRUE(keeper.storable()) << "the calibration sees no contact";
+}
+
 TEST_F(KeeperTest, RezeroFollowsDrift) {
   calibrate();
   ASSERT_TRUE(run(40));
