@@ -6,10 +6,8 @@
 #include <stdexcept>
 
 #include "hal/libcamera/libcamera_camera.hpp"
-#include "hal/live/exposure.hpp"
 #include "hal/null/null.hpp"
 #include "hal/replay/replay_camera.hpp"
-#include "hal/sim/scene.hpp"
 #include "hal/sim/sim_camera.hpp"
 #include "hal/sim/sim_ring.hpp"
 #include "hal/v4l2/finder.hpp"
@@ -63,16 +61,12 @@ Devices open_devices(const Config& config) {
 void check_devices(const Config& config) {
   const CameraConfig& camera = config.camera;
   if (camera.backend == "replay") replay::check(camera);
-  if (camera.backend == "sim" && !camera.sim.scene.empty()) (void)sim::load_scene(camera.sim.scene);
+  if (camera.backend == "sim") sim::check(camera);
   if (camera.backend == "v4l2") {
     (void)v4l2::DeviceName(camera.v4l2.device);
     (void)v4l2::PhotometricLock(camera.v4l2);
   }
-  if (camera.backend == "libcamera") {
-    const LibcameraConfig& asked = camera.libcamera;
-    (void)live::exposure_us("camera.libcamera", asked.exposure_us, asked.exposure_pwm_periods,
-                            asked.pwm_hz);
-  }
+  if (camera.backend == "libcamera") libcamera_backend::check(camera);
   if (config.ring.backend == "ws2812_spi") ws2812::check_spi(config.ring.ws2812);
 }
 

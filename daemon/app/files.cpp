@@ -17,6 +17,7 @@
 #include "daemon/app/config.hpp"
 #include "daemon/app/service.hpp"
 #include "daemon/net/calibration_store.hpp"
+#include "daemon/pipeline/pipeline.hpp"
 #include "daemon/serve/admission.hpp"
 #include "daemon/serve/security.hpp"
 #include "daemon/serve/tls.hpp"
@@ -64,6 +65,15 @@ void check_camera_files(const hal::CameraConfig& camera) {
 void check_devices(const hal::Config& config) {
   check_camera_files(config.camera);
   hal::check_devices(config);
+  const hal::CameraConfig& camera = config.camera;
+  if (camera.backend == "replay") return;  // a recording has a size of its own
+  hal::CameraInfo frames;
+  frames.identity = camera.backend;
+  frames.width = camera.width / camera.decode_scale;
+  frames.height = camera.height / camera.decode_scale;
+  frames.decode_scale = camera.decode_scale;
+  frames.fps = camera.fps;
+  pipeline::check_camera(frames);
 }
 
 std::filesystem::path calibration_folder(const Config& config) {

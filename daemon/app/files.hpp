@@ -15,7 +15,8 @@ void check_readable(const std::string& key, const std::filesystem::path& path);
 
 /// The same of what the camera that is configured reads: a scene, a recording.
 void check_camera_files(const hal::CameraConfig& camera);
-/// The same and hal::check_devices().
+/// The same, hal::check_devices() and pipeline::check_camera(): what a start would refuse without
+/// opening a device.
 void check_devices(const hal::Config& config);
 
 /// The folder of the calibration to run with as long as none that was uploaded is current: the

@@ -7,9 +7,8 @@
 #include <utility>
 
 namespace dtact::pipeline {
-namespace {
 
-hal::CameraInfo checked(const hal::CameraInfo& info) {
+void check_camera(const hal::CameraInfo& info) {
   if (info.width < kMinFrameWidth || info.height < kMinFrameHeight) {
     throw std::invalid_argument(
         fmt::format("camera {} delivers {}x{} pixels; at least {}x{} are needed: choose another "
@@ -21,6 +20,12 @@ hal::CameraInfo checked(const hal::CameraInfo& info) {
     throw std::invalid_argument(
         fmt::format("camera {} states no frame rate: set camera.fps above 0", info.identity));
   }
+}
+
+namespace {
+
+hal::CameraInfo checked(hal::CameraInfo info) {
+  check_camera(info);
   return info;
 }
 

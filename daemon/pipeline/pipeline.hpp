@@ -15,6 +15,10 @@
 
 namespace dtact::pipeline {
 
+/// Throws std::invalid_argument naming the setting and its fix when frames of this size or rate
+/// cannot be used.
+void check_camera(const hal::CameraInfo& info);
+
 /// The sensor at work: owns camera and ring and the three threads about them (capture, light,
 /// storage). Between start() and stop() the network thread uses it through Port.
 class Pipeline final : public Port {

@@ -44,7 +44,6 @@ std::shared_ptr<lc::Camera> find(lc::CameraManager& manager, const std::string& 
 }
 
 live::Opener opener(const CameraConfig& config) {
-  check_pixel_format(config.libcamera.pixel_format);
   return [config, lock = PhotometricLock(config.libcamera, config.fps),
           heap = std::make_shared<DmaHeap>()]() -> live::Opened {
     auto manager = std::make_unique<Manager>();
@@ -60,7 +59,13 @@ live::Opener opener(const CameraConfig& config) {
 
 }  // namespace
 
+void check(const CameraConfig& config) {
+  check_pixel_format(config.libcamera.pixel_format);
+  (void)PhotometricLock(config.libcamera, config.fps);
+}
+
 std::unique_ptr<Camera> make_camera(const CameraConfig& config) {
+  check(config);
   // libcamera's chatter is for its developers. It reads this at its first line, and has no call for
   // it that works for all its parts.
   ::setenv("LIBCAMERA_LOG_LEVELS", "*:ERROR", /*overwrite=*/0);

@@ -16,6 +16,7 @@
 #include "hal/luma/luma.hpp"
 #include "hal/mjpeg/grey_decoder.hpp"
 #include "hal/sim/device.hpp"
+#include "hal/sim/payload.hpp"
 
 namespace dtact::hal::sim {
 namespace {
@@ -170,6 +171,12 @@ bool SimCamera::Impl::decode(const Payload& payload, luma::LumaBuffer& buffer) n
       return decoder && decoder->decode(bytes, buffer.data(), buffer.stride()) == mjpeg::Status::ok;
   }
   return false;
+}
+
+void check(const CameraConfig& config) {
+  const Scene scene = configured_scene(config);
+  (void)PayloadEncoder(output_from_name(config.sim.output), scene.camera.width,
+                       scene.camera.height);
 }
 
 SimCamera::SimCamera(const CameraConfig& config, std::shared_ptr<LightLink> link,

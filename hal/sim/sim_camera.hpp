@@ -9,6 +9,10 @@
 
 namespace dtact::hal::sim {
 
+/// Checks what the camera would refuse, without solving the scene. Throws std::runtime_error naming
+/// file, line, key and fix.
+void check(const CameraConfig& config);
+
 /// The simulated sensor's camera. A thread of its own, "dtact-sim", is the device: it makes each
 /// frame one period ahead and delivers it at its deadline. grab() unpacks the payload as it would
 /// a real camera's. The device keeps three payloads: one it fills, the newest complete one, one
@@ -19,8 +23,7 @@ namespace dtact::hal::sim {
 /// sequence, none is skipped, and scripted gaps pass without waiting.
 class SimCamera final : public Camera, private FrameOwner {
  public:
-  /// Loads and solves the scene (seconds for many presses). Throws std::runtime_error naming file,
-  /// line, key and fix.
+  /// Loads and solves the scene (seconds for many presses). Throws as check().
   SimCamera(const CameraConfig& config, std::shared_ptr<LightLink> link,
             base::Clock& clock = base::system_clock());
   ~SimCamera() override;

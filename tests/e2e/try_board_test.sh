@@ -1,10 +1,13 @@
 #!/usr/bin/env bash
 # try_board_test.sh SOURCE DTACTD DTACTCTL: the script for a first user of a board makes a report with
 # the facts, the findings and a measurement, but without the home folder or a serial number; and
-# dtactd accepts every board's configuration.
+# dtactd accepts every board's configuration, except that one built without libcamera says so.
 set -euo pipefail
 source=$1 dtactd=$2 dtactctl=$3
-for file in "$source"/config/boards/*.toml; do "$dtactd" --config "$file" --check-config; done
+for file in "$source"/config/boards/*.toml; do
+  refused=$("$dtactd" --config "$file" --check-config 2>&1) ||
+    [[ $refused == *"built without libcamera"* ]] || { echo "$refused"; exit 1; }
+done
 
 HOME=$(mktemp -d)
 export HOME

@@ -3,9 +3,9 @@
 #include <unistd.h>
 
 #include <cstdlib>
+#include <exception>
 #include <filesystem>
 #include <functional>
-#include <stdexcept>
 
 #include "daemon/app/files.hpp"
 #include "hal/base/atomic_file.hpp"
@@ -16,6 +16,7 @@ namespace dtact::app {
 namespace {
 
 using testing::AllOf;
+using testing::AnyOf;
 using testing::HasSubstr;
 using testing::Not;
 using testing::StartsWith;
@@ -23,7 +24,7 @@ using testing::StartsWith;
 std::string error(const std::function<void()>& check) {
   try {
     check();
-  } catch (const std::runtime_error& e) {
+  } catch (const std::exception& e) {
     return e.what();
   }
   return "no error";
@@ -96,8 +97,34 @@ TEST(InputFiles, SettingsOfDevicesFitEachOther) {
   spi.ring.ws2812.spi_bits = 8;
   EXPECT_THAT(said(spi), StartsWith("ring.ws2812.spi_hz: "));
   config.camera.backend = "libcamera";
+  const auto without = HasSubstr("built without libcamera");
+  hal::Config exposure = config;
+  exposure.camera.libcamera.exposure_us = 20'000;  // at 60 frames a second
+  EXPECT_THAT(said(exposure), AnyOf(HasSubstr("longer than a frame"), without));
   config.camera.libcamera.exposure_pwm_periods = 2;
-  EXPECT_THAT(said(config), HasSubstr("camera.libcamera.pwm_hz"));
+  EXPECT_THAT(said(config), AnyOf(HasSubstr("camera.libcamera.pwm_hz"), without));
+}
+
+TEST(InputFiles, AModeThatTheCameraOrThePipelineLacksIsRefused) {
+  const auto said = [](const hal::CameraConfig& camera) {
+    return error([&] { app::check_devices({.camera = camera, .ring = {}}); });
+  };
+  hal::CameraConfig camera;  // sim
+  EXPECT_EQ(said(camera), "no error");
+  camera.fps = 0.5;
+  EXPECT_THAT(said(camera), HasSubstr("no mode 800 x 600 at 0.5 frames a second"));
+  camera.fps = 60;
+  camera.width = 801;
+  camera.sim.output = "yuyv";
+  EXPECT_THAT(said(camera), StartsWith("camera.width = 801: "));
+  camera.backend = "v4l2";
+  EXPECT_EQ(said(camera), "no error") << "its driver knows";
+  camera.width = 316;
+  camera.height = 236;
+  camera.decode_scale = 4;
+  EXPECT_THAT(said(camera), StartsWith("camera v4l2 delivers 79x59 pixels; at least 80x60 "));
+  camera.decode_scale = 2;
+  EXPECT_EQ(said(camera), "no error");
 }
 
 TEST(InputFiles, AnUploadedCalibrationIsUsedInsteadOfTheConfiguredOne) {

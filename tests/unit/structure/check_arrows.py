@@ -23,7 +23,7 @@ ROOMS = {
     "hal/gpiod": ["hal", "hal/base"],
     "hal/ws2812": ["hal", "hal/base", "hal/gpiod"],
     # The registry is the only file that names backends.
-    "hal": ["hal/null", "hal/replay", "hal/sim", "hal/live", "hal/v4l2", "hal/libcamera", "hal/ws2812"],
+    "hal": ["hal/null", "hal/replay", "hal/sim", "hal/v4l2", "hal/libcamera", "hal/ws2812"],
     "daemon/recon": [],
     "daemon/calibration": ["hal/base", "hal/files", "daemon/recon"],
     # The two rooms inside may use the pipeline's settings, health flags and the frame that it fills.
