@@ -67,8 +67,9 @@ void notify_reloading() {
 }
 
 unsigned long long watchdog_interval_us() {
-  std::uint64_t interval = 0;
-  return sd_watchdog_enabled(0, &interval) > 0 ? interval / 2 : 0;
+  constexpr std::uint64_t kLooks = 8;  // a thread may be blocked for 7 of 8 parts of the time
+  std::uint64_t limit = 0;
+  return sd_watchdog_enabled(0, &limit) > 0 ? limit / kLooks : 0;
 }
 void notify_alive() { (void)notify("WATCHDOG=1", 0); }
 

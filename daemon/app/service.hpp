@@ -16,8 +16,8 @@ void notify_stopping();
 /// waits for both, Type=notify shows them.
 void notify_reloading();
 
-/// Half of the unit's WatchdogSec= in microseconds, the interval at which to call notify_alive();
-/// 0 when no watchdog is set.
+/// An eighth of the unit's WatchdogSec= in microseconds, the interval at which to call
+/// notify_alive(); 0 when no watchdog is set.
 [[nodiscard]] unsigned long long watchdog_interval_us();
 void notify_alive();
 

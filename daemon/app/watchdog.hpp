@@ -11,10 +11,10 @@ class io_context;
 
 namespace dtact::app {
 
-/// Notifies systemd's watchdog (WatchdogSec= of the unit) that the daemon is alive: twice a period,
-/// and only when the heartbeat has advanced since the last time. So when a thread hangs inside a
-/// driver, systemd restarts the daemon. Does nothing where no watchdog is set. Runs on the
-/// thread that runs `io`.
+/// Notifies systemd's watchdog (WatchdogSec= of the unit) that the daemon is alive: eight times a
+/// period, and only when the heartbeat has advanced since the last time. So when a thread hangs
+/// inside a driver, systemd restarts the daemon, but not for a block of seven eighths of the
+/// period. Does nothing where no watchdog is set. Runs on the thread that runs `io`.
 class Watchdog {
  public:
   /// `heartbeat`: a count that goes on as long as the watched thread works.

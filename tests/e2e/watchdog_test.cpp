@@ -16,7 +16,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 using namespace std::chrono_literals;
 
-/// A daemon of a service whose WatchdogSec= is 0.4 s, fed every 0.2 s.
+/// A daemon of a service whose WatchdogSec= is 0.4 s, fed every 0.05 s.
 class Watched {
  public:
   explicit Watched(const std::vector<std::string>& settings)
