@@ -217,6 +217,22 @@ TEST(PhotometricLock, FindsAndSetsBackWhatMoved) {
   EXPECT_EQ(lock.check(fd.get(), controls), "");
 }
 
+TEST(PhotometricLock, LocksAtTheNearestStep) {
+  EmulatedCamera device;
+  const base::UniqueFd fd = open_camera();
+  device.set_step(V4L2_CID_EXPOSURE_ABSOLUTE, 10);  // 1, 11, ... 991
+  V4l2Config c;
+  c.exposure_us = 20'000;
+  auto controls = applied(c, fd.get());
+  EXPECT_EQ(controls[3].value, 201);
+  EXPECT_EQ(controls[3].verdict, ControlVerdict::confirmed);
+  EXPECT_EQ(controls[3].note, "");
+  c.exposure_us = 700;
+  controls = applied(c, fd.get());
+  EXPECT_EQ(controls[3].value, 11);
+  EXPECT_EQ(controls[3].note, "1100 us is the nearest this camera has to 700.0 us");
+}
+
 TEST(PhotometricLock, ChangesToTheNearestStep) {
   EmulatedCamera device;
   const base::UniqueFd fd = open_camera();
