@@ -112,7 +112,7 @@ DepthFrame Pipeline::prototype(const calibration::Calibration* calibration) cons
   // Sized, not only reserved: copies keep the size, and the pages are mapped now.
   frame.depth_um.resize(map);
   // Maps of up to this number of rows record their tiles here.
-  constexpr int kMaxRows = 4096;
+  constexpr int kMaxRows = 8192;
   frame.drawn.tiles.resize(kMaxRows / recon::TileGrid::kRows);
   frame.luma.resize(pixels(info_.width, info_.height));
   // The size of YUYV, for which drivers make room themselves (uvcvideo: the camera's
