@@ -31,6 +31,14 @@ std::string join_group(const Machine& machine, const std::string& path,
       machine.user() == kServiceUser ? " && sudo systemctl restart dtactd" : ", then log in again");
 }
 
+/// Whether a camera has this name: "serial:NUMBER" or "bus:NAME".
+bool is_attached(const Machine& machine, const std::string& name) {
+  const std::vector<hal::v4l2::SurveyedCamera> cameras = machine.cameras();
+  return std::ranges::any_of(cameras, [&](const hal::v4l2::SurveyedCamera& camera) {
+    return name == "serial:" + camera.attached.serial || name == "bus:" + camera.attached.bus;
+  });
+}
+
 bool is_raspberry_pi(const Machine& machine) { return machine.model().starts_with("Raspberry Pi"); }
 
 /// The first with an RP1.
@@ -115,14 +123,19 @@ Findings check_camera(const Machine& machine, const hal::CameraConfig& camera) {
     findings.push_back({bad, "no video node captures", "v4l2-ctl --list-devices"});
   }
   // Another camera does not make up for the one that is meant.
-  if (const std::string& device = camera.v4l2.device;
-      camera.backend == "v4l2" && device.starts_with("/dev/")) {
+  const std::string& device = camera.v4l2.device;
+  if (camera.backend == "v4l2" && device.starts_with("/dev/")) {
     if (const int error = machine.access(device); error != 0) {
       findings.push_back(
           {bad, fmt::format("camera.v4l2.device = \"{}\": {}", device, std::strerror(error)),
            error == ENOENT ? "plug it in, or take a name that dtactctl cameras shows"
                            : join_group(machine, device, "video")});
     }
+  } else if (camera.backend == "v4l2" && !device.empty() && !is_attached(machine, device)) {
+    // The name may be a serial number, which a report leaves out.
+    findings.push_back(
+        {bad, "the camera that camera.v4l2.device names is not attached",
+         fmt::format("plug {} in, or take a name that dtactctl cameras shows", device)});
   }
   // A Raspberry Pi 4 has these nodes for its image processor without any camera (bcm2835-isp).
   if (captures && !usb && camera.backend == "v4l2" && camera.v4l2.device.empty()) {

@@ -52,6 +52,27 @@ TEST(DoctorCamera, AnotherCameraIsNotTheConfiguredOne) {
   EXPECT_THAT(finding.fix, HasSubstr("dtactctl cameras"));
 }
 
+TEST(DoctorCamera, AnotherCameraIsNotTheOneOfASerialNumberOrABus) {
+  FakeMachine machine;
+  machine.file("/dev/video0");
+  machine.videos = {{"/dev/video0", {true, "Webcam", 0}}};
+  machine.attached.emplace_back().attached.serial = "4711";
+  machine.attached.emplace_back().attached.bus = "usb-0000:00:14.0-2";
+  hal::CameraConfig camera = v4l2();
+  for (const char* name : {"serial:4711", "bus:usb-0000:00:14.0-2"}) {
+    camera.v4l2.device = name;
+    EXPECT_TRUE(all_good(check_camera(machine, camera))) << name;
+  }
+  for (const char* name : {"serial:0815", "bus:usb-0000:00:14.0-3", "serial:471"}) {
+    camera.v4l2.device = name;
+    const Finding finding = only_trouble(check_camera(machine, camera));
+    EXPECT_EQ(finding.verdict, Verdict::wrong);
+    EXPECT_EQ(finding.what, "the camera that camera.v4l2.device names is not attached")
+        << "a report names no serial number";
+    EXPECT_THAT(finding.fix, HasSubstr(name));
+  }
+}
+
 TEST(DoctorCamera, OnlyMetadataIsNoCamera) {
   FakeMachine machine;
   machine.file("/dev/video1");
