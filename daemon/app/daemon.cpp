@@ -227,6 +227,20 @@ void run_daemon(const Config& config, const std::function<Config()>& load) {
   // Before any thread starts, so that every thread leaves the signals to this one.
   asio::signal_set signals(io, SIGTERM, SIGINT);
   asio::signal_set hangups(io, SIGHUP);
+  bool stopping = false;
+  std::function<void()> end_service;  // once the daemon serves
+  signals.async_wait([&](const boost::system::error_code& error, int signal) {
+    if (error) return;
+    spdlog::info("{}: stopping", signal == SIGTERM ? "SIGTERM" : "SIGINT");
+    notify_stopping();
+    stopping = true;
+    if (end_service) end_service();
+  });
+  // Asked between the steps of the start, each of which may take seconds.
+  const auto asked_to_stop = [&] {
+    io.poll();
+    return stopping;
+  };
 
   net::NetConfig net = make_net_config(config);
   std::random_device random;
@@ -240,6 +254,7 @@ void run_daemon(const Config& config, const std::function<Config()>& load) {
   check_camera_files(config.hal.camera);
   hal::Devices devices = hal::open_devices(config.hal);
   log_step("camera and ring are open");
+  if (asked_to_stop()) return;
   const hal::RingReport ring = devices.ring->attend(config.pipeline.light);
   if (ring.away) spdlog::warn("no LED ring yet, it is looked for: {}", ring.message);
   if (!ring.note.empty()) spdlog::warn("ring: {}", ring.note);
@@ -263,9 +278,14 @@ void run_daemon(const Config& config, const std::function<Config()>& load) {
   }
   auto calibration = load_calibration(folder, config, settings.calibration_note);
   log_step("the calibration is read");
+  if (asked_to_stop()) {
+    store.end_start();  // the calibration is not the cause
+    return;
+  }
   const bool uncalibrated = calibration == nullptr;
   const auto made = make_pipeline(std::move(devices), calibration, settings, store);
   log_step("its tables are made");
+  if (asked_to_stop()) return;
   pipeline::Pipeline& pipeline = *made;
   calibration.reset();  // its megabytes go when another one comes into use
   if (net.fifo_priority > 0) {
@@ -287,7 +307,6 @@ void run_daemon(const Config& config, const std::function<Config()>& load) {
       io, [&pipeline] { return pipeline.status(); },
       fmt::format("listening on {}", fmt::join(server.addresses(), " and ")), reported);
   Config running = config;
-  bool stopping = false;
   std::function<void()> wait_for_hangup = [&] {
     hangups.async_wait([&](const boost::system::error_code& error, int) {
       if (error || stopping) return;  // one that came with the signal to stop has no error
@@ -300,11 +319,7 @@ void run_daemon(const Config& config, const std::function<Config()>& load) {
   wait_for_hangup();
   Watchdog watchdog(io, [&pipeline] { return pipeline.heartbeat(); });
   ThrottleTimer throttle_timer(io);
-  signals.async_wait([&](const boost::system::error_code& error, int signal) {
-    if (error) return;
-    spdlog::info("{}: stopping", signal == SIGTERM ? "SIGTERM" : "SIGINT");
-    notify_stopping();
-    stopping = true;
+  end_service = [&] {
     hangups.cancel();
     reporter.stop();
     watchdog.stop();
@@ -312,7 +327,7 @@ void run_daemon(const Config& config, const std::function<Config()>& load) {
     if (announced) announced->stop();
     if (metrics) metrics->stop();
     server.stop();
-  });
+  };
 
   // Once for each, so that a line ends with one address.
   for (const std::string& address : server.addresses()) {

@@ -1,7 +1,10 @@
 // SIGHUP: the settings that a running daemon applies when it reads its configuration again.
+#include <fcntl.h>
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <signal.h>
+#include <sys/stat.h>
 
 #include <chrono>
 #include <cstdlib>
@@ -9,8 +12,11 @@
 #include <fstream>
 #include <memory>
 #include <optional>
+#include <system_error>
+#include <thread>
 
 #include "clients/cpp/client.hpp"
+#include "hal/base/unique_fd.hpp"
 #include "proto/fingerprint.hpp"
 #include "tests/e2e/daemon_process.hpp"
 #include "tests/fakes/notify_socket.hpp"
@@ -191,6 +197,36 @@ TEST(Start, NamesTheCheckOfAConfigurationWithAMistake) {
   EXPECT_THAT(output, HasSubstr("once it is fixed, check it: dtactd --check-config"));
   EXPECT_THAT(status.value_or(""),
               AllOf(StartsWith("STATUS=--set: camera.width"), EndsWith("dtactd --check-config")));
+}
+
+/// Whether the process has the file open.
+bool has_open(pid_t pid, const fs::path& file) {
+  std::error_code ignored;  // one that is closed meanwhile
+  for (const auto& entry : fs::directory_iterator(fmt::format("/proc/{}/fd", pid), ignored)) {
+    if (fs::read_symlink(entry.path(), ignored) == file) return true;
+  }
+  return false;
+}
+
+// Steps of a start take seconds on a slow board: it does not go on to serve.
+TEST(Start, EndsWithTheStepInWhichItIsAskedTo) {
+  const TempFolder folder;
+  const fs::path scene = folder.path() / "scene.toml";
+  ASSERT_EQ(::mkfifo(scene.c_str(), 0600), 0);
+  base::UniqueFd writer(
+      ::open(scene.c_str(), O_RDWR | O_CLOEXEC));  // the daemon waits for its text
+  ASSERT_TRUE(writer);
+  Program daemon({DTACTD_PROGRAM, "--set", "net.port=0", "--set",
+                  "state_dir=" + folder.path().string(), "--set",
+                  "camera.sim.scene=" + scene.string()});
+  for (int i = 0; i < 6000 && !has_open(daemon.pid(), scene); ++i) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  ASSERT_TRUE(has_open(daemon.pid(), scene)) << daemon.log();
+  ASSERT_EQ(::kill(daemon.pid(), SIGTERM), 0);
+  writer.reset();  // an empty scene
+  EXPECT_EQ(daemon.stop(0), 0);
+  EXPECT_THAT(daemon.log(), AllOf(HasSubstr("SIGTERM: stopping"), Not(HasSubstr("listening"))));
 }
 
 class CheckOfFiles : public testing::Test {
