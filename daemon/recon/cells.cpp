@@ -16,8 +16,8 @@ namespace hn = hwy::HWY_NAMESPACE;
 
 #if HWY_TARGET == HWY_SCALAR
 
-void SumCells(const uint8_t* luma, std::ptrdiff_t stride, int cells, CellLimits limits,
-              int32_t* sum, int32_t* upper, int32_t* rough, CellCounts& counts) {
+void SumCells(const uint8_t* luma, std::ptrdiff_t stride, int cells, uint8_t clipped, int32_t* sum,
+              int32_t* upper, int32_t* rough, int64_t& saturated) {
   for (int cell = 0; cell < cells; ++cell) {
     sum[cell] = 0;
     rough[cell] = 0;
@@ -26,8 +26,7 @@ void SumCells(const uint8_t* luma, std::ptrdiff_t stride, int cells, CellLimits 
       const uint8_t* row = luma + y * stride + cell * kCell;
       for (int x = 0; x < kCell; ++x) {
         sum[cell] += row[x];
-        counts.saturated += row[x] >= limits.saturated ? 1 : 0;
-        counts.dark += row[x] <= limits.dark ? 1 : 0;
+        saturated += row[x] >= clipped ? 1 : 0;
         const int step = row[x + (y % 8 == 0 ? kRowStep * stride : 0)] - row[x];
         rough[cell] += step < 0 ? -step : step;
       }
@@ -37,39 +36,34 @@ void SumCells(const uint8_t* luma, std::ptrdiff_t stride, int cells, CellLimits 
 
 #else
 
-/// Saturated and dark pixels of a row of cells, `bytes` wide, one by one: few frames have any.
-HWY_NOINLINE void CountPixels(const uint8_t* luma, std::ptrdiff_t stride, size_t bytes,
-                              CellLimits limits, CellCounts& counts) {
+/// Saturated pixels of a row of cells, `bytes` wide, one by one: few frames have any.
+HWY_NOINLINE void CountSaturated(const uint8_t* luma, std::ptrdiff_t stride, size_t bytes,
+                                 uint8_t clipped, int64_t& saturated) {
   for (int y = 0; y < kCell; y += kRowStep) {
-    int saturated = 0;
-    int dark = 0;
+    int in_row = 0;
     for (size_t x = 0; x < bytes; ++x) {
-      saturated += luma[y * stride + static_cast<std::ptrdiff_t>(x)] >= limits.saturated ? 1 : 0;
-      dark += luma[y * stride + static_cast<std::ptrdiff_t>(x)] <= limits.dark ? 1 : 0;
+      in_row += luma[y * stride + static_cast<std::ptrdiff_t>(x)] >= clipped ? 1 : 0;
     }
-    counts.saturated += saturated;
-    counts.dark += dark;
+    saturated += in_row;
   }
 }
 
 /// The number of cells that fit into `d8`.
 template <class D8>
-HWY_INLINE void SumVector(D8 d8, const uint8_t* luma, std::ptrdiff_t stride, CellLimits limits,
-                          int32_t* sum, int32_t* upper, int32_t* rough, CellCounts& counts) {
+HWY_INLINE void SumVector(D8 d8, const uint8_t* luma, std::ptrdiff_t stride, uint8_t clipped,
+                          int32_t* sum, int32_t* upper, int32_t* rough, int64_t& saturated) {
   const hn::Repartition<uint64_t, D8> d64;
   constexpr size_t kCells = hn::MaxLanes(D8()) / kCell;
   auto sums = hn::Zero(d64);
   auto uppers = hn::Zero(d64);
   auto steps = hn::Zero(d64);
   auto brightest = hn::Zero(d8);
-  auto darkest = hn::Set(d8, 255);
   auto before = hn::Zero(d8);
   for (int y = 0; y < kCell; y += kRowStep) {
     const auto row = hn::LoadU(d8, luma + y * stride);
     if (y == kCell / 2) uppers = sums;
     sums = hn::Add(sums, hn::SumsOf8(row));
     brightest = hn::Max(brightest, row);
-    darkest = hn::Min(darkest, row);
     if (y % 8 == kRowStep) {
       const auto step = hn::Sub(hn::Max(row, before), hn::Min(row, before));
       steps = hn::Add(steps, hn::SumsOf8(step));
@@ -86,26 +80,25 @@ HWY_INLINE void SumVector(D8 d8, const uint8_t* luma, std::ptrdiff_t stride, Cel
   store(sums, sum);
   store(uppers, upper);
   store(steps, rough);
-  const auto bright = hn::Max(brightest, hn::Set(d8, limits.saturated));
-  const auto dark = hn::Min(darkest, hn::Set(d8, limits.dark));
-  if (HWY_UNLIKELY(!hn::AllFalse(d8, hn::Or(hn::Eq(bright, brightest), hn::Eq(dark, darkest))))) {
-    CountPixels(luma, stride, hn::MaxLanes(D8()), limits, counts);
+  const auto bright = hn::Max(brightest, hn::Set(d8, clipped));
+  if (HWY_UNLIKELY(!hn::AllFalse(d8, hn::Eq(bright, brightest)))) {
+    CountSaturated(luma, stride, hn::MaxLanes(D8()), clipped, saturated);
   }
 }
 
-void SumCells(const uint8_t* luma, std::ptrdiff_t stride, int cells, CellLimits limits,
-              int32_t* sum, int32_t* upper, int32_t* rough, CellCounts& counts) {
+void SumCells(const uint8_t* luma, std::ptrdiff_t stride, int cells, uint8_t clipped, int32_t* sum,
+              int32_t* upper, int32_t* rough, int64_t& saturated) {
   const hn::ScalableTag<uint8_t> wide;
   const hn::CappedTag<uint8_t, kCell> narrow;
   constexpr int kWide = static_cast<int>(hn::MaxLanes(wide) / kCell);
   int cell = 0;
   for (; cell + kWide <= cells; cell += kWide) {
-    SumVector(wide, luma + std::ptrdiff_t{cell} * kCell, stride, limits, sum + cell, upper + cell,
-              rough + cell, counts);
+    SumVector(wide, luma + std::ptrdiff_t{cell} * kCell, stride, clipped, sum + cell, upper + cell,
+              rough + cell, saturated);
   }
   for (; cell < cells; ++cell) {
-    SumVector(narrow, luma + std::ptrdiff_t{cell} * kCell, stride, limits, sum + cell, upper + cell,
-              rough + cell, counts);
+    SumVector(narrow, luma + std::ptrdiff_t{cell} * kCell, stride, clipped, sum + cell,
+              upper + cell, rough + cell, saturated);
   }
 }
 
@@ -130,7 +123,6 @@ CellTotals CompareCells(const CellPlanes& p, const ChangeLimits& limits) {
   constexpr int kLanes = static_cast<int>(hn::MaxLanes(d32));
   V32 grey = hn::Zero(d32);
   V32 change_sum = hn::Zero(d32);
-  V32 rough = hn::Zero(d32);
   V32 step = hn::Zero(d32);
   V32 any = hn::Zero(d32);
   for (int i = 0; i < p.rows * p.stride; i += kLanes) {
@@ -144,7 +136,6 @@ CellTotals CompareCells(const CellPlanes& p, const ChangeLimits& limits) {
     const V32 in_contact = hn::LoadU(d32, p.active + i);
     grey = hn::Add(grey, sum);
     change_sum = hn::Add(change_sum, hn::AndNot(in_contact, hn::ShiftRight<8>(change)));
-    rough = hn::Add(rough, hn::AndNot(in_contact, hn::LoadU(d32, p.rough + i)));
     const V32 moved = hn::Abs(hn::Sub(sum, hn::LoadU(d32, p.sum_before + i)));
     step = hn::Add(step, hn::AndNot(in_contact, moved));
   }
@@ -182,8 +173,7 @@ CellTotals CompareCells(const CellPlanes& p, const ChangeLimits& limits) {
     hn::Store(v, d32, lanes);
     return std::accumulate(std::begin(lanes), std::end(lanes), int64_t{0});
   };
-  return {total(grey), total(change_sum), total(rough), total(step),
-          static_cast<int>(total(active))};
+  return {total(grey), total(change_sum), total(step), static_cast<int>(total(active))};
 }
 
 }  // namespace dtact::recon::vec::HWY_NAMESPACE
@@ -195,10 +185,10 @@ namespace dtact::recon::vec {
 HWY_EXPORT(SumCells);
 HWY_EXPORT(CompareCells);
 
-void sum_cells(const std::uint8_t* luma, std::ptrdiff_t stride, int cells, CellLimits limits,
+void sum_cells(const std::uint8_t* luma, std::ptrdiff_t stride, int cells, std::uint8_t clipped,
                std::int32_t* sum, std::int32_t* upper, std::int32_t* rough,
-               CellCounts& counts) noexcept {
-  HWY_DYNAMIC_DISPATCH(SumCells)(luma, stride, cells, limits, sum, upper, rough, counts);
+               std::int64_t& saturated) noexcept {
+  HWY_DYNAMIC_DISPATCH(SumCells)(luma, stride, cells, clipped, sum, upper, rough, saturated);
 }
 
 CellTotals compare_cells(const CellPlanes& planes, const ChangeLimits& limits) noexcept {

@@ -12,25 +12,14 @@ inline constexpr int kRowStep = 2;
 inline constexpr int kCellPixels = kCell * kCell / kRowStep;  ///< Read of a cell.
 inline constexpr int kRoughPixels = 2 * kCell;                ///< pixels for the roughness
 
-/// How the pixels of the cells are counted.
-struct CellLimits {
-  std::uint8_t saturated = 250;  ///< Grey from here on is saturated.
-  std::uint8_t dark = 5;         ///< Grey up to here is dark.
-};
-
-/// Added to, not set.
-struct CellCounts {
-  std::int64_t saturated = 0;
-  std::int64_t dark = 0;
-};
-
 /// Sums up one row of `cells` adjacent cells that begins at `luma`, rows `stride` bytes apart.
 /// sum[i]: sum of grey levels of cell i; upper[i]: that of its upper half. rough[i]:
 /// |difference| of its rows 0 and 2 plus that of its rows 8 and 10, summed over kRoughPixels
-/// pairs of pixels. For white noise the mean is 1.128 standard deviations.
-void sum_cells(const std::uint8_t* luma, std::ptrdiff_t stride, int cells, CellLimits limits,
+/// pairs of pixels. For white noise the mean is 1.128 standard deviations. The number of pixels
+/// that are `clipped` or brighter is added to `saturated`.
+void sum_cells(const std::uint8_t* luma, std::ptrdiff_t stride, int cells, std::uint8_t clipped,
                std::int32_t* sum, std::int32_t* upper, std::int32_t* rough,
-               CellCounts& counts) noexcept;
+               std::int64_t& saturated) noexcept;
 
 /// Rows of cells are stored in multiples of this, with at least one cell of zeros at the end.
 inline constexpr int kCellBlock = 16;
@@ -48,10 +37,9 @@ struct CellPlanes {
   int window_rows = 0;
   const std::int32_t* sum = nullptr;
   const std::int32_t* sum_before = nullptr;  ///< the previous frame's
-  const std::int32_t* rough = nullptr;
-  const std::int32_t* expected = nullptr;  ///< Mean grey, Q16.
-  std::int32_t* change = nullptr;          ///< Out: sum's mean − expected, Q16.
-  std::int32_t* cell = nullptr;            ///< In and out: the cell's own change is active.
+  const std::int32_t* expected = nullptr;    ///< Mean grey, Q16.
+  std::int32_t* change = nullptr;            ///< Out: sum's mean − expected, Q16.
+  std::int32_t* cell = nullptr;              ///< In and out: the cell's own change is active.
   std::int32_t* window = nullptr;  ///< The same of the mean of it, its right and lower neighbours.
   std::int32_t* active = nullptr;  ///< Out: active by itself or in any window. In: as it was.
 };
@@ -68,9 +56,8 @@ struct ChangeLimits {
 struct CellTotals {
   std::int64_t grey = 0;          ///< of `sum`
   std::int64_t quiet_change = 0;  ///< of `change`, Q8
-  std::int64_t quiet_rough = 0;
-  std::int64_t quiet_step = 0;  ///< Of |sum − sum_before|.
-  int active = 0;               ///< Cells now.
+  std::int64_t quiet_step = 0;    ///< Of |sum − sum_before|.
+  int active = 0;                 ///< Cells now.
 };
 
 [[nodiscard]] CellTotals compare_cells(const CellPlanes& planes,

@@ -30,7 +30,7 @@ class Ripple {
 
 }  // namespace
 
-CellSums::CellSums(const recon::CellLattice& lattice, const vec::CellLimits& limits)
+CellSums::CellSums(const recon::CellLattice& lattice, const CellLimits& limits)
     : lattice_(lattice), limits_(limits) {
   for (auto* plane : {&sum_, &sum_before_, &upper_, &upper_before_, &rough_}) {
     plane->resize(lattice.at(0, lattice.rows()));
@@ -40,7 +40,7 @@ CellSums::CellSums(const recon::CellLattice& lattice, const vec::CellLimits& lim
 void CellSums::add(const std::uint8_t* luma, std::ptrdiff_t stride) noexcept {
   std::swap(sum_, sum_before_);
   std::swap(upper_, upper_before_);
-  counts_ = {};
+  saturated_ = 0;
   ++frames_;
   const int last = lattice_.columns() - 1;
   const bool overlaps = lattice_.last_column_overlaps();
@@ -48,8 +48,8 @@ void CellSums::add(const std::uint8_t* luma, std::ptrdiff_t stride) noexcept {
     const std::uint8_t* const from = luma + lattice_.y_of(row) * stride;
     const auto sum = [&](int column, int cells) {
       const std::size_t i = lattice_.at(column, row);
-      vec::sum_cells(from + lattice_.x_of(column), stride, cells, limits_, &sum_[i], &upper_[i],
-                     &rough_[i], counts_);
+      vec::sum_cells(from + lattice_.x_of(column), stride, cells, limits_.saturated, &sum_[i],
+                     &upper_[i], &rough_[i], saturated_);
     };
     sum(0, overlaps ? last : last + 1);
     if (overlaps) sum(last, 1);
@@ -59,8 +59,7 @@ void CellSums::add(const std::uint8_t* luma, std::ptrdiff_t stride) noexcept {
 FrameStatistics CellSums::statistics() const noexcept {
   FrameStatistics statistics;
   statistics.pixels = std::int64_t{lattice_.cells()} * vec::kCellPixels;
-  statistics.saturated = counts_.saturated;
-  statistics.dark = counts_.dark;
+  statistics.saturated = saturated_;
   if (frames_ < 2) return statistics;
   Ripple ripple;
   Ripple fine;

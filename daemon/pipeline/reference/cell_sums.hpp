@@ -12,12 +12,17 @@ namespace dtact::pipeline {
 /// Standard deviation over mean magnitude of a Gaussian's difference of two draws: √(π/2)/√2.
 inline constexpr double kFromDifference = 0.8862;
 
+/// Grey levels at which a pixel is clipped.
+struct CellLimits {
+  std::uint8_t saturated = 250;  ///< From here on.
+  std::uint8_t dark = 5;         ///< Up to here.
+};
+
 /// Statistics of a frame, alone and against the previous one, over the part that the map reads.
 /// Grey levels.
 struct FrameStatistics {
   std::int64_t pixels = 0;
   std::int64_t saturated = 0;  ///< Pixels at least as bright as CellLimits::saturated.
-  std::int64_t dark = 0;       ///< Pixels at most as bright as CellLimits::dark.
   /// Standard deviation of a pixel's noise, from all cells: steep depth adds a little.
   double rough_noise = 0;
   /// Rows of cells, at the frame's edge or inside, that equal the previous frame's bit for bit.
@@ -33,7 +38,7 @@ struct FrameStatistics {
 /// The newest frame and the one before as sums over cells. Never allocates after construction.
 class CellSums {
  public:
-  CellSums(const recon::CellLattice& lattice, const recon::vec::CellLimits& limits);
+  CellSums(const recon::CellLattice& lattice, const CellLimits& limits);
 
   /// Sums the next frame; a lattice without cells sums nothing.
   void add(const std::uint8_t* luma, std::ptrdiff_t stride) noexcept;
@@ -43,7 +48,6 @@ class CellSums {
   // Planes of the lattice's cells (recon::vec::sum_cells).
   [[nodiscard]] const std::int32_t* now() const noexcept { return sum_.data(); }
   [[nodiscard]] const std::int32_t* before() const noexcept { return sum_before_.data(); }
-  [[nodiscard]] const std::int32_t* rough() const noexcept { return rough_.data(); }
   /// Frames added.
   [[nodiscard]] std::uint64_t frames() const noexcept { return frames_; }
   /// The next frame has none before.
@@ -51,13 +55,13 @@ class CellSums {
 
  private:
   recon::CellLattice lattice_;
-  recon::vec::CellLimits limits_;
+  CellLimits limits_;
   std::vector<std::int32_t> sum_;
   std::vector<std::int32_t> sum_before_;
   std::vector<std::int32_t> upper_;  // sums over the upper halves
   std::vector<std::int32_t> upper_before_;
   std::vector<std::int32_t> rough_;
-  recon::vec::CellCounts counts_;
+  std::int64_t saturated_ = 0;  // pixels of the newest
   std::uint64_t frames_ = 0;
 };
 

@@ -203,8 +203,8 @@ CellReport Cells::look(const hal::LumaView& luma) noexcept {
       vec::compare_cells({lattice_.stride(), lattice_.rows(),
                           lattice_.columns() - (lattice_.last_column_overlaps() ? 2 : 1),
                           lattice_.rows() - (lattice_.last_row_overlaps() ? 2 : 1), sums_.now(),
-                          sums_.before(), sums_.rough(), expected_.data(), change_.data() + margin_,
-                          cell_.data(), window_.data() + margin_, active_.data() + margin_},
+                          sums_.before(), expected_.data(), change_.data() + margin_, cell_.data(),
+                          window_.data() + margin_, active_.data() + margin_},
                          change_limits);
   active_cells_ = totals.active;
   const auto mean = [quiet](std::int64_t total) {
@@ -215,7 +215,6 @@ CellReport Cells::look(const hal::LumaView& luma) noexcept {
     noise_ += (noise_ == 0 ? 1 : kNoiseWeight) * (now - noise_);
   }
   report.mean_grey = static_cast<double>(totals.grey) / cells / vec::kCellPixels;
-  report.pixel_noise = kFromDifference * mean(totals.quiet_rough) / vec::kRoughPixels;
   report.cell_noise = noise_;
   report.quiet_change = mean(totals.quiet_change) / 256;
   report.light =

@@ -33,7 +33,7 @@ struct CellSettings {
   double drift_per_frame = 0.01 / 60;
   /// … and at most so far from the reference: what a press slower than that can lose.
   double drift_limit = 1.0;
-  recon::vec::CellLimits limits;
+  CellLimits limits;
 };
 
 /// The light seen in a frame, as one factor on the reference image.
@@ -52,7 +52,6 @@ struct LightSeen {
 /// Result of comparing one frame. Grey levels.
 struct CellReport {
   double mean_grey = 0;
-  double pixel_noise = 0;   ///< Standard deviation of a pixel's noise, from quiet cells.
   double cell_noise = 0;    ///< Frame-to-frame noise of a quiet cell's mean, slowly averaged.
   double quiet_change = 0;  ///< Frame − reference image (drift followed), mean of quiet cells.
   double drift = 0;         ///< Mean of what was followed since the reference was set.

@@ -36,7 +36,6 @@ TEST_P(Cells, TotalsOfALargeFrameDoNotOverflow) {
                                            .window_rows = kRows - 1,
                                            .sum = sum.data(),
                                            .sum_before = zeros.data(),
-                                           .rough = zeros.data(),
                                            .expected = zeros.data(),
                                            .change = change.data() + kBeyond,
                                            .cell = cell.data(),
