@@ -56,19 +56,17 @@ struct RingInfo {
 /// What became of a write to the ring.
 struct ShowResult {
   bool ok = true;
-  std::string message;   ///< When not ok: what failed and the fix. When dimmed: why.
-  double dimmed_to = 1;  ///< What a current limit left of the light asked for; 1 = all of it.
-  bool away = false;     ///< When not ok: there is no ring to write to now; attend() looks for it.
+  std::string message;  ///< When not ok: what failed and the fix. When a current limit dims: why.
+  bool away = false;    ///< When not ok: there is no ring to write to now; attend() looks for it.
 };
 
 /// Run-time state of a ring.
 struct RingReport {
-  bool ok = true;              ///< The ring is there and the last write worked.
-  bool away = false;           ///< It is looked for; once it is there, show() it its light again.
-  std::string message;         ///< When not ok: what failed and the fix.
-  std::string note;            ///< information that is not an error; empty = none
-  std::uint64_t writes = 0;    ///< Tried, re-sends included.
-  std::uint64_t failures = 0;  ///< failed writes among them
+  bool ok = true;            ///< The ring is there and the last write worked.
+  bool away = false;         ///< It is looked for; once it is there, show() it its light again.
+  std::string message;       ///< When not ok: what failed and the fix.
+  std::string note;          ///< information that is not an error; empty = none
+  std::uint64_t writes = 0;  ///< Tried, re-sends included.
   /// The longest time until the next call of attend().
   std::chrono::nanoseconds due = std::chrono::milliseconds(250);
 };

@@ -20,16 +20,14 @@ class LatestSlot {  // NOLINT(clang-analyzer-optin.performance.Padding): see the
   /// Writer: the one to fill. The same object until publish().
   [[nodiscard]] T& back() noexcept { return pool_[back_]; }
 
-  /// Writer: publishes back() as the newest. True when that replaced a value that was not fetched.
-  bool publish() noexcept {
+  /// Writer: publishes back() as the newest.
+  void publish() noexcept {
     // Release: the reader that takes this index sees what was written. Acquire: what the reader
     // read from the buffer that comes back is over.
     const std::uint8_t old =
         waiting_.exchange(static_cast<std::uint8_t>(back_ | kFresh), std::memory_order_acq_rel);
     back_ = old & kIndex;
-    const bool was_fresh = (old & kFresh) != 0;
-    if (was_fresh) replaced_.store(replaced() + 1, std::memory_order_relaxed);
-    return was_fresh;
+    if ((old & kFresh) != 0) replaced_.store(replaced() + 1, std::memory_order_relaxed);
   }
 
   /// Reader: the newest that was not fetched yet, or null. Valid until a later

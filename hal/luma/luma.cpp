@@ -90,8 +90,6 @@ void copy_line(Layout layout, const std::uint8_t* in, std::uint8_t* out, int wid
 
 }  // namespace
 
-std::uint8_t expand_limited(std::uint8_t y) noexcept { return kExpansion[y]; }
-
 std::size_t payload_bytes(Layout layout, int width, int height,
                           std::ptrdiff_t bytes_per_line) noexcept {
   const std::ptrdiff_t packed = std::ptrdiff_t{pixel_bytes(layout)} * width;

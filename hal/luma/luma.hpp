@@ -55,7 +55,7 @@ enum class Layout : std::uint8_t {
 /// from the configuration. The payload itself does not show it.
 enum class Range : std::uint8_t {
   full,    ///< 0 = black, 255 = white: taken as it is.
-  limited  ///< 16 = black, 235 = white (ITU-R BT.601): expanded.
+  limited  ///< 16 = black, 235 = white (ITU-R BT.601): expanded, what lies beyond saturates.
 };
 
 enum class ExtractStatus : std::uint8_t {
@@ -63,10 +63,6 @@ enum class ExtractStatus : std::uint8_t {
   short_payload,  ///< Fewer bytes than the image needs: a truncated frame. Nothing was written.
   bad_shape       ///< Lines shorter than the width, or an odd side where the layout has none.
 };
-
-/// One limited-range value in full range: (y − 16)·255/219 rounded to nearest, so 16 → 0 and
-/// 235 → 255; below 16 and above 235 (foot- and headroom) saturate.
-[[nodiscard]] std::uint8_t expand_limited(std::uint8_t y) noexcept;
 
 /// The bytes that a payload must have at least: the last line needs no padding. For NV12 that is
 /// the whole of both planes, so that a payload which lost its tail is noticed.

@@ -35,13 +35,11 @@ ShowResult Ring::show(const Light& light) {
   const DimmedLight dimmed = dim(light, dimming_);
   if (!wire_ && std::chrono::steady_clock::now() >= next_look_) look_for_ring();
   const std::string error = wire_ ? write(in_chain_order(dimmed.leds)) : report_.message;
-  if (!error.empty()) return {false, error, dimmed.scale, report_.away};
+  if (!error.empty()) return {false, error, report_.away};
   if (dimmed.scale >= 1) return {};
-  return {true,
-          fmt::format("dimmed to {:.0f} % of the light asked for, {:.0f} mA: "
-                      "ring.ws2812.current_budget_ma = {:.0f}",
-                      dimmed.scale * 100, dimmed.milliamps, config_.current_budget_ma),
-          dimmed.scale};
+  return {true, fmt::format("dimmed to {:.0f} % of the light asked for, {:.0f} mA: "
+                            "ring.ws2812.current_budget_ma = {:.0f}",
+                            dimmed.scale * 100, dimmed.milliamps, config_.current_budget_ma)};
 }
 
 RingReport Ring::attend(const Light& light) {
@@ -93,7 +91,6 @@ std::string Ring::write(const Leds& leds) {
     next_send_ = std::chrono::steady_clock::now() + std::chrono::milliseconds(config_.resend_ms);
   }
   ++report_.writes;
-  report_.failures += error.empty() ? 0U : 1U;
   report_.ok = error.empty();
   report_.message = error;
   report_.note = wire_->note();

@@ -41,7 +41,7 @@ class FakeRing final : public hal::LightRing {
 
   [[nodiscard]] hal::RingInfo info() const override { return {"fake", "fake ring"}; }
   [[nodiscard]] hal::ShowResult show(const hal::Light& light) override {
-    if (handle_.away) return {false, kAway, 1, true};
+    if (handle_.away) return {false, kAway, true};
     if (handle_.broken) return {false, "the fake ring is broken: fix it"};
     {
       const std::scoped_lock lock(handle_.mutex);

@@ -111,14 +111,6 @@ void Resolutions::add(const recon::CellLattice& lattice, int decimation, int ste
       .drawn = {}};
 }
 
-std::optional<std::size_t> Resolutions::find(int decimation, int steps) const noexcept {
-  const auto found = std::ranges::find_if(all_, [&](const Resolution& each) {
-    return each.decimation() == decimation && each.steps() == steps;
-  });
-  if (found == all_.end()) return std::nullopt;
-  return static_cast<std::size_t>(found - all_.begin());
-}
-
 MapShape Resolutions::shape() const noexcept {
   const Resolution& now = all_[in_use_];
   const recon::RectifyTable& table = now.reconstructor.model().rectify;

@@ -73,8 +73,6 @@ class Resolutions {
   [[nodiscard]] std::size_t resolution_index() const noexcept { return in_use_; }
   [[nodiscard]] std::span<const Resolution> resolutions() const noexcept { return all_; }
   void use(std::size_t resolution_index) noexcept { in_use_ = resolution_index; }
-  /// The index for this decimation and number of steps, if there is one.
-  [[nodiscard]] std::optional<std::size_t> find(int decimation, int steps) const noexcept;
 
   /// The map at the resolution in use.
   [[nodiscard]] MapShape shape() const noexcept;

@@ -42,17 +42,15 @@ TEST(LumaBuffer, RefusesSizesNoCameraHas) {
   EXPECT_THROW(LumaBuffer(16385, 1), std::invalid_argument);
 }
 
-TEST(ExpandLimited, MapsBlackAndWhiteAndRoundsToNearest) {
-  EXPECT_EQ(expand_limited(0), 0);
-  EXPECT_EQ(expand_limited(16), 0);
-  EXPECT_EQ(expand_limited(17), 1);     // 255/219 = 1.164
-  EXPECT_EQ(expand_limited(18), 2);     // 2.329
-  EXPECT_EQ(expand_limited(19), 3);     // 3.493
-  EXPECT_EQ(expand_limited(22), 7);     // 6.986
-  EXPECT_EQ(expand_limited(126), 128);  // 128.08
-  EXPECT_EQ(expand_limited(234), 254);  // 253.84
-  EXPECT_EQ(expand_limited(235), 255);
-  EXPECT_EQ(expand_limited(255), 255);
+TEST(Extract, LimitedRangeMapsBlackAndWhiteAndRoundsToNearest) {
+  // 255/219 = 1.164; 2.329, 3.493, 6.986, 128.08, 253.84.
+  const std::vector<std::uint8_t> payload = {0, 16, 17, 18, 19, 22, 126, 234, 235, 255};
+  const std::vector<int> expanded = {0, 0, 1, 2, 3, 7, 128, 254, 255, 255};
+  LumaBuffer out(10, 1);
+  ASSERT_EQ(extract(Layout::grey, Range::limited, payload, 0, out), ExtractStatus::ok);
+  for (int x = 0; x < 10; ++x) {
+    EXPECT_EQ(out.row(0)[x], expanded[static_cast<std::size_t>(x)]) << x;
+  }
 }
 
 TEST(Extract, GreyKeepsFullRangeAsItIs) {

@@ -136,11 +136,10 @@ TEST_F(LightDriverTest, AfterAFailedCommandTheLightBeforeItIsReSent) {
 
 TEST_F(LightDriverTest, AReSendThatFailsIsAConditionUntilItHeals) {
   driver.start();
-  ring.set_report(
-      {.ok = false, .message = "the wire is cut", .note = {}, .writes = 2, .failures = 1});
+  ring.set_report({.ok = false, .message = "the wire is cut", .note = {}, .writes = 2});
   EXPECT_TRUE(eventually([&] { return driver.trouble(); }));
   EXPECT_TRUE(eventually([&] { return driver.message() == "the wire is cut"; }));
-  ring.set_report({.ok = true, .message = {}, .note = {}, .writes = 3, .failures = 1});
+  ring.set_report({.ok = true, .message = {}, .note = {}, .writes = 3});
   EXPECT_TRUE(eventually([&] { return !driver.trouble() && driver.message().empty(); }));
 }
 
@@ -152,7 +151,7 @@ TEST_F(LightDriverTest, AfterAFailedCommandAReSendThatWorksIsAReturn) {
   ASSERT_TRUE(driver.submit({SetLight{dimmed(100)}}));
   ASSERT_TRUE(next());
   EXPECT_EQ(driver.light_since_ns(), std::nullopt);
-  ring.set_report({.ok = true, .message = {}, .note = {}, .writes = 3, .failures = 1});
+  ring.set_report({.ok = true, .message = {}, .note = {}, .writes = 3});
   EXPECT_TRUE(eventually([&] { return driver.light_since_ns().has_value(); }));
   EXPECT_FALSE(driver.trouble());
   driver.stop();
@@ -168,8 +167,7 @@ TEST_F(LightDriverTest, AfterAFailedCommandAReSendThatWorksIsAReturn) {
 
 TEST_F(LightDriverTest, WhatIsWorthKnowingOfTheRingIsReportedWhileNothingIsWrong) {
   driver.start();
-  ring.set_report(
-      {.ok = true, .message = {}, .note = "one write was late", .writes = 2, .failures = 0});
+  ring.set_report({.ok = true, .message = {}, .note = "one write was late", .writes = 2});
   EXPECT_TRUE(eventually([&] { return driver.message() == "one write was late"; }));
   EXPECT_FALSE(driver.trouble());
   ring.broken = true;
@@ -184,7 +182,7 @@ TEST_F(LightDriverTest, ARingThatNeverReSendsHealsByTheNextWriteAlone) {
   ring.broken = true;
   ASSERT_TRUE(driver.submit({SetLight{dimmed(100)}}));
   ASSERT_TRUE(next());
-  ring.set_report({.ok = true, .message = {}, .note = {}, .writes = 0, .failures = 0});
+  ring.set_report({.ok = true, .message = {}, .note = {}, .writes = 0});
   std::this_thread::sleep_for(std::chrono::milliseconds(600));  // in which it is looked at twice
   EXPECT_TRUE(driver.trouble());
   EXPECT_EQ(driver.message(), "the fake ring is broken: fix it");

@@ -158,7 +158,6 @@ TEST(Ws2812Ring, AFailedWriteIsTheCommandsErrorAndHealsByItself) {
   EXPECT_FALSE(result.ok);
   EXPECT_EQ(result.message, "the wire is cut: fix it");
   EXPECT_FALSE(ours->attend(kRed).ok);
-  EXPECT_GE(ours->attend(kRed).failures, 1U);
 
   record->fail_with("");
   ASSERT_TRUE(eventually([&] { return ours->attend(kRed).ok; }));
@@ -184,11 +183,9 @@ TEST(Ws2812Ring, SaysWhenTheBudgetDimmed) {
   const auto ours = ring(record, config);
   const ShowResult white = ours->show(Light{});
   EXPECT_TRUE(white.ok);
-  EXPECT_NEAR(white.dimmed_to, 0.513, 0.001);
   EXPECT_THAT(white.message, HasSubstr("dimmed to 51 %"));
   EXPECT_THAT(white.message, HasSubstr("current_budget_ma = 250"));
   const ShowResult red = ours->show(kRed);  // 8 · 20.7 mA
-  EXPECT_EQ(red.dimmed_to, 1);
   EXPECT_EQ(red.message, "");
 }
 
