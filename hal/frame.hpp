@@ -74,8 +74,8 @@ class FrameOwner {
   ~FrameOwner() = default;
 };
 
-/// A frame on loan: the buffer goes home when the lease is destroyed or overwritten. Must not
-/// outlive its camera. Move-only; a moved-from lease is empty.
+/// A frame on loan: the buffer is released when the lease is destroyed or overwritten, which the
+/// thread that grabs does. Must not outlive its camera. Move-only; a moved-from lease is empty.
 class Frame {
  public:
   Frame() = default;

@@ -4,7 +4,6 @@
 #include <libcamera/framebuffer_allocator.h>
 
 #include <array>
-#include <atomic>
 #include <condition_variable>
 #include <memory>
 #include <mutex>
@@ -85,7 +84,7 @@ class Session final : public live::Source {
   double fps_;
   std::vector<std::unique_ptr<libcamera::FrameBuffer>> own_buffers_;  // those from the heap
   std::vector<Slot> slots_;
-  std::atomic<int> queued_{0};  // a frame may be released on another thread
+  int queued_ = 0;
   bool acquired_ = false;
 
   // Shared with libcamera's thread; held for copies that do not allocate.

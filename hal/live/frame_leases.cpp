@@ -31,13 +31,13 @@ PayloadStatus FrameLeases::deliver(PayloadDecoder& decoder, const FilledBuffer& 
     return PayloadStatus::ok;
   }
 
-  const int index = leased_[0].load(std::memory_order_acquire) ? 1 : 0;
+  const int index = leased_[0] ? 1 : 0;
   luma::LumaBuffer& buffer = pool_[static_cast<std::size_t>(index)];
   const std::int64_t begin = base::system_clock().monotonic_ns();
   const PayloadStatus status = decoder.decode(filled, buffer);
   if (status != PayloadStatus::ok) return status;
   frame.decode_ns = base::system_clock().monotonic_ns() - begin;
-  leased_[static_cast<std::size_t>(index)].store(true, std::memory_order_relaxed);
+  leased_[static_cast<std::size_t>(index)] = true;
   kept = format.encoding == Encoding::jpeg;
   if (kept) jpegs_[static_cast<std::size_t>(index)] = {current_, filled.index};
   out = Frame(*this, index, buffer.view(), frame,
@@ -50,7 +50,7 @@ void FrameLeases::give_back(int index) noexcept {
     return end_lease(leased_buffers_[static_cast<std::size_t>(index - kLeasedPayload)]);
   }
   end_lease(jpegs_[static_cast<std::size_t>(index)]);
-  leased_[static_cast<std::size_t>(index)].store(false, std::memory_order_release);
+  leased_[static_cast<std::size_t>(index)] = false;
 }
 
 void FrameLeases::end_lease(Lease& taken) noexcept {

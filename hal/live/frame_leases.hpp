@@ -1,7 +1,6 @@
 #pragma once
 
 #include <array>
-#include <atomic>
 #include <cstdint>
 #include <memory>
 
@@ -14,7 +13,7 @@ namespace dtact::hal::live {
 
 /// Makes frames of the driver's buffers: lends the buffer where its bytes are the image already,
 /// else decodes into one of two of its own. What was lent comes back by itself when the frame goes.
-/// One thread's own, but for frames that are given back by another.
+/// One thread's own.
 class FrameLeases final : private FrameOwner {
  public:
   FrameLeases(int width, int height);
@@ -39,7 +38,7 @@ class FrameLeases final : private FrameOwner {
 
   std::shared_ptr<Source> current_;
   std::array<luma::LumaBuffer, 2> pool_;  // one with the caller, one to decode into
-  std::array<std::atomic<bool>, 2> leased_{};
+  std::array<bool, 2> leased_{};
   std::array<Lease, 2>
       leased_buffers_;          // one with the caller, one to deliver; without lender: free
   std::array<Lease, 2> jpegs_;  // what the pool's buffers were decoded from

@@ -89,7 +89,7 @@ class SimCamera::Impl {
   std::optional<mjpeg::GreyDecoder> decoder;
   // The caller holds one frame at most: one more to decode into.
   std::array<luma::LumaBuffer, 2> buffers;
-  std::array<std::atomic<bool>, 2> lent{};
+  std::array<bool, 2> lent{};
 
   // The grabbing thread's.
   std::uint64_t next_sequence = 0;

@@ -2,7 +2,6 @@
 
 #include <linux/videodev2.h>
 
-#include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -63,7 +62,7 @@ class Stream final : public live::Source {
   live::Format format_;
   bool uvcvideo_ = false;  // the driver
   std::vector<std::span<std::uint8_t>> buffers_;
-  std::atomic<int> queued_{0};  // a frame may be released on another thread
+  int queued_ = 0;
 };
 
 }  // namespace dtact::hal::v4l2
