@@ -149,7 +149,7 @@ TEST_F(CellsTest, HealthIsGatheredInTheSameLook) {
   EXPECT_NEAR(report_.mean_grey, 150, 0.1);
   // One level, and 4 % of other spread by whole grey levels.
   EXPECT_NEAR(report_.cell_noise, 1.04 / std::sqrt(128), 0.02);  // 128 pixels of a cell are read
-  EXPECT_NEAR(report_.quiet_change, 0, 0.05);
+  EXPECT_NEAR(report_.quiet_change, 16 * 105. / (14 * 10 * 128), 0.05);
   EXPECT_EQ(report_.frame.saturated, 16);
   EXPECT_EQ(report_.cells, 14 * 10);
   EXPECT_EQ(report_.frame.pixels, 14 * 10 * 128);
