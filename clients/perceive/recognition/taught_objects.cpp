@@ -62,7 +62,8 @@ TaughtObject teach(Network& network, std::string name, std::span<const TouchMap>
   object.features.reserve(presses.size());
   for (const TouchMap& press : presses) object.features.push_back(network.run(press).features);
   // Half more than the second largest: ten presses do not show an object's every side, and one odd
-  // press must not make the object everything.
+  // press must not make the object everything. Nor must two: one of twenty simulated objects would
+  // have a radius above 0.15.
   std::vector<double> apart;
   apart.reserve(object.features.size());
   for (std::size_t i = 0; i < object.features.size(); ++i) {
@@ -70,7 +71,8 @@ TaughtObject teach(Network& network, std::string name, std::span<const TouchMap>
   }
   std::ranges::sort(apart, std::greater());
   constexpr double kMinRadius = 0.01;
-  object.radius = std::max(kMinRadius, apart.size() > 1 ? 1.5 * apart[1] : 0.0);
+  constexpr double kMaxRadius = 0.15;
+  object.radius = std::clamp(apart.size() > 1 ? 1.5 * apart[1] : 0.0, kMinRadius, kMaxRadius);
   return object;
 }
 

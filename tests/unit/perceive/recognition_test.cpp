@@ -300,5 +300,27 @@ TEST(TaughtObjects, WinWithinTheirRadiusOnly) {
   EXPECT_FALSE(candidate(touch_map(grid_of(flat))).taught);
 }
 
+// Two presses that resemble no other would else set a radius that takes in nearly everything.
+TEST(TaughtObjects, AreNotEverythingWithTwoOddPresses) {
+  Network network;
+  const auto box = [](int width, int height) {
+    std::vector<std::int16_t> values(kWidth * kHeight, 0);
+    for (int y = 0; y < height; ++y) {
+      std::fill_n(values.begin() + (20 + y) * kWidth + 20, width, 900);
+    }
+    return touch_map(grid_of(values));
+  };
+  std::vector<TouchMap> presses;
+  for (const double deep_mm : {0.8, 0.83, 0.86, 0.89, 0.92, 0.95, 0.98, 1.0}) {
+    presses.push_back(touch_map(grid_of(values_of({.deep_mm = deep_mm}))));
+  }
+  presses.push_back(box(60, 60));
+  presses.push_back(box(70, 4));
+  const TaughtObject object = teach(network, "three sides", presses);
+  for (const std::size_t odd : {8U, 9U}) {
+    EXPECT_GT(nearest(object, object.features[odd], odd), object.radius) << odd;
+  }
+}
+
 }  // namespace
 }  // namespace dtact::perceive
