@@ -145,10 +145,10 @@ void Link::serve(client::Connection& connection, std::chrono::milliseconds timeo
     for (const std::string& message : outgoing) {
       connection.write(message, {client::after(timeout)});
     }
-    while (const std::string* message = connection.read({Clock::now() + kForever, wake_.get()})) {
-      handlers_.message(*message);
-      if (stopping_) return;
-    }
+    // One message at a time: a handler slower than the stream always finds the next one waiting,
+    // and what is to be sent would never go out.
+    const std::string* message = connection.read({Clock::now() + kForever, wake_.get()});
+    if (message != nullptr) handlers_.message(*message);
   }
 }
 
