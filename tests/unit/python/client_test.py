@@ -192,7 +192,7 @@ class Frames(unittest.TestCase):
                 next(s.frames()).depth_mm
 
 
-class Connecting(unittest.TestCase):
+class Addresses(unittest.TestCase):
     def test_a_silent_address_does_not_delay_the_next_one(self):
         with FakeDaemon() as daemon, silent_first(daemon.address) as host:
             began = time.monotonic()
