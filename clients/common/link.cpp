@@ -30,8 +30,9 @@ constexpr std::uint64_t kHelloId = 1;
 Link::Link(client::Options options, Handlers handlers)
     : handlers_(std::move(handlers)),
       wake_(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)),
+      stop_(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)),
       options_(std::move(options)) {
-  if (!wake_) throw std::system_error(errno, std::generic_category(), "eventfd");
+  if (!wake_ || !stop_) throw std::system_error(errno, std::generic_category(), "eventfd");
   thread_ = std::thread([this] { run(); });
 }
 
@@ -56,6 +57,7 @@ void Link::use(client::Options options) {
 
 void Link::stop() noexcept {
   stopping_ = true;
+  (void)::eventfd_write(stop_.get(), 1);
   wake();
 }
 
@@ -143,7 +145,7 @@ void Link::serve(client::Connection& connection, std::chrono::milliseconds timeo
       outgoing.swap(outgoing_);
     }
     for (const std::string& message : outgoing) {
-      connection.write(message, {client::after(timeout)});
+      connection.write(message, {client::after(timeout, message.size()), stop_.get()});
     }
     // One message at a time: a handler slower than the stream always finds the next one waiting,
     // and what is to be sent would never go out.

@@ -52,7 +52,8 @@ class Link {
   void drain() const noexcept;
 
   Handlers handlers_;
-  base::UniqueFd wake_;  ///< An eventfd.
+  base::UniqueFd wake_;  ///< An eventfd: there is something to send, or the end.
+  base::UniqueFd stop_;  ///< An eventfd that stays readable once stop() was called.
   std::atomic<bool> stopping_ = false;
   std::atomic<bool> ended_ = false;
   std::mutex mutex_;

@@ -18,14 +18,16 @@ struct Limit {
   int wake = -1;
 };
 
-/// The moment in `wait` from now: the clock's last one where its count does not reach that far.
-[[nodiscard]] inline std::chrono::steady_clock::time_point after(std::chrono::milliseconds wait) {
+/// The moment in `wait` from now, and later by what a message of `bytes` takes at 1 Mbit/s: the
+/// clock's last one where its count does not reach that far.
+[[nodiscard]] inline std::chrono::steady_clock::time_point after(std::chrono::milliseconds wait,
+                                                                 std::size_t bytes = 0) {
   using Clock = std::chrono::steady_clock;
-  const auto now = Clock::now();
+  const auto from = Clock::now() + std::chrono::milliseconds(bytes / 125);
   // Compared as milliseconds: milliseconds::max() is more than the clock's nanoseconds can count.
-  const auto most = std::chrono::floor<std::chrono::milliseconds>(Clock::time_point::max() - now);
+  const auto most = std::chrono::floor<std::chrono::milliseconds>(Clock::time_point::max() - from);
   if (wait.count() >= most.count()) return Clock::time_point::max();
-  return now + std::max(wait, std::chrono::milliseconds(0));
+  return from + std::max(wait, std::chrono::milliseconds(0));
 }
 
 /// Waits until `fd` is ready for `events` (of poll(2)); −1 waits for the limit alone. False: the

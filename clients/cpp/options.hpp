@@ -34,7 +34,8 @@ struct Options {
   std::string host = wire::kDefaultAddress;
   std::uint16_t port = wire::kDefaultPort;   ///< Where `host` names none.
   std::string program = "dtact C++ client";  ///< Shown by dtactctl status; at most 64 bytes.
-  std::chrono::milliseconds timeout{5000};   ///< For the connection and each request.
+  /// For the connection and each request. Large requests have longer, for slow networks.
+  std::chrono::milliseconds timeout{5000};
   /// The token, if the daemon requires one: at most 256 bytes, see read_token(). Sent only over
   /// TLS, on this machine, or if `insecure` is set.
   std::string token{};

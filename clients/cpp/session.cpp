@@ -198,7 +198,7 @@ v1::Reply Session::request(v1::ClientMessage& message, std::chrono::milliseconds
     reopen(-1);
   }
   try {
-    return exchange(message, {after(timeout)});
+    return exchange(message, {after(timeout, message.ByteSizeLong())});
   } catch (const TimeoutError&) {
     throw;
   } catch (const ConnectionError& e) {

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "clients/cpp/client.hpp"
+#include "clients/cpp/session.hpp"
 #include "tests/unit/client/played_daemon.hpp"
 
 namespace dtact::client::test {
@@ -25,6 +26,21 @@ TEST(Rezero, WaitsAsLongAsTheDaemonSays) {
   daemon.options.timeout = std::chrono::milliseconds(200);
   Client client(daemon.options);
   EXPECT_THROW(client.rezero(), Refused);
+}
+
+// Before: over a slow network an upload ended with "takes no data".
+TEST(Upload, HasLongerThanASmallRequest) {
+  PlayedDaemon daemon({[](Peer& peer) {
+    peer.greet();
+    std::this_thread::sleep_for(std::chrono::seconds(3));
+    peer.done();
+  }});
+  daemon.options.timeout = std::chrono::seconds(2);
+  Session session(daemon.options);
+  v1::ClientMessage message;
+  // More than the buffers of two sockets hold.
+  message.mutable_upload_calibration()->set_reference_png(std::string(12'000'000, 'p'));
+  EXPECT_TRUE(session.request(message, daemon.options.timeout).has_done());
 }
 
 TEST(Features, PingAndReference) {

@@ -300,6 +300,17 @@ class Requests(unittest.TestCase):
             s.activate_calibration(0)
             self.assertTrue(daemon.requests[-1].activate_calibration.HasField("number"))
 
+    def test_a_large_upload_has_the_time_that_a_slow_network_needs(self):
+        def late(request, reply):
+            time.sleep(0.5)
+            reply.done.calibration = 5
+
+        with FakeDaemon() as daemon, dtact.connect(daemon.address, timeout=0.2) as s, \
+                mock.patch("dtact.session._SLOW_S", 0.2):
+            daemon.answers = {"upload_calibration": late}
+            files = dtact.CalibrationFiles("c", b"t", bytes(5_000_000))
+            self.assertEqual(s.upload_calibration(files), 5)
+
     def test_a_calibration_that_cannot_be_written_leaves_the_one_before(self):
         with tempfile.TemporaryDirectory() as folder:
             before = dtact.CalibrationFiles(pathlib.Path(folder).name, b"t", b"p")

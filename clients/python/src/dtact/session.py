@@ -31,6 +31,8 @@ from .values import Server, Status
 
 #: Calibrations take the daemon seconds.
 _SLOW_S = 30.0
+#: The slowest network over which a large request arrives in time: 1 Mbit/s.
+_SLOWEST_BYTES_PER_S = 125_000
 #: The longest wait between attempts to connect again. After a connection that lasted longer the waits
 #: begin with the shortest.
 _LONGEST_WAIT_S = 5.0
@@ -205,7 +207,8 @@ class Session:
     def _patience(self, request: Request[T]) -> float:
         if request.averages and self._server is not None:
             return self._timeout + self._server.rezero_timeout_s
-        return max(self._timeout, _SLOW_S) if request.slow else self._timeout
+        seconds = max(self._timeout, _SLOW_S) if request.slow else self._timeout
+        return seconds + request.message.ByteSize() / _SLOWEST_BYTES_PER_S
 
     def _subscribe_request(self, subscription: Subscription | None,
                            again: bool = False) -> Request[None]:
