@@ -1,13 +1,9 @@
-#include <fcntl.h>
 #include <fmt/format.h>
 #include <unistd.h>
 
-#include <cerrno>
 #include <chrono>
 #include <csignal>
 #include <cstdint>
-#include <cstdio>
-#include <filesystem>
 #include <iostream>
 #include <map>
 #include <memory>
@@ -25,12 +21,12 @@
 #include "clients/common/sibling_program.hpp"
 #include "clients/ctl/online.hpp"
 #include "clients/recording/channels.hpp"
+#include "clients/recording/part_file_sink.hpp"
 #include "clients/recording/recorder.hpp"
 
 namespace dtact::ctl {
 namespace {
 
-namespace fs = std::filesystem;
 using Clock = std::chrono::steady_clock;
 using std::chrono::milliseconds;
 
@@ -63,46 +59,13 @@ v1::Subscribe subscription_for(const client::Client& client, const RecordOptions
   return subscription;
 }
 
-/// The file that is written until the first frame is there: an earlier recording stays until then.
-/// Empty for what is no regular file, as a pipe, which is written straight to.
-std::string part_of(const std::string& output) {
-  if (fs::exists(output) && !fs::is_regular_file(output)) return {};
-  // A link stays one; what it points to is replaced.
-  return (fs::exists(output) ? fs::canonical(output).string() : output) + ".part";
-}
-
-/// Gives the file its name. Throws std::runtime_error, also where another has taken it since.
-void rename_part(const std::string& part, const std::string& output, bool force) {
-  const std::string name = part.substr(0, part.size() - std::string_view(".part").size());
-  const auto move = [&](unsigned flags) {
-    return ::renameat2(AT_FDCWD, part.c_str(), AT_FDCWD, name.c_str(), flags) == 0 ? 0 : errno;
-  };
-  int error = move(force ? 0U : unsigned{RENAME_NOREPLACE});
-  // Some network file systems cannot look and rename in one step.
-  if (error == EINVAL && !force) error = fs::exists(name) ? EEXIST : move(0);
-  if (error == 0) return;
-  throw std::runtime_error(fmt::format("{} cannot be given the name {}: {}", part, output,
-                                       std::generic_category().message(error)));
-}
-
-/// Removes the file at its end, unless the path is empty by then.
-struct RemovedAtTheEnd {
-  ~RemovedAtTheEnd() {
-    std::error_code ignored;
-    if (!path.empty()) fs::remove(path, ignored);
-  }
-  std::string path;
-};
-
 /// One run of the command: from the daemon to the file.
 class Recording {
  public:
   Recording(const Context& context, const RecordOptions& options)
       : options_(options),
         client_(context.target),
-        sink_(part_of(options.output).empty() ? options.output : part_of(options.output),
-              options.force, options.output),
-        part_{part_of(options.output)},
+        sink_(options.output, options.force),
         recorder_(sink_, {context.target.program, options.pictures_hz}) {}
 
   /// Until interrupted, the time is over, the disk refuses or the daemon goes.
@@ -160,8 +123,7 @@ class Recording {
     if (seen_++ > 0) return;
     recorder_.add(status);
     attach_files();
-    if (!part_.path.empty()) rename_part(part_.path, options_.output, options_.force);
-    part_.path.clear();
+    sink_.give_name();
     // The Python package waits for this line.
     std::cerr << "recording to " << options_.output << '\n';
   }
@@ -203,8 +165,7 @@ class Recording {
 
   const RecordOptions& options_;
   client::Client client_;
-  mcap::FileSink sink_;
-  RemovedAtTheEnd part_;
+  recording::PartFileSink sink_;
   recording::Recorder recorder_;
   Clock::time_point began_ = Clock::now();
   std::map<std::string, mcap::Attachment> files_;  // that wait for the first frame
@@ -232,15 +193,6 @@ void run_record(const Context& context, const RecordOptions& options) {
   // that is gone, which does not matter to the recording.
   (void)std::signal(SIGXFSZ, SIG_IGN);
   (void)std::signal(SIGPIPE, SIG_IGN);
-  if (!options.force && fs::exists(options.output)) {
-    throw std::runtime_error(options.output + " exists: name another file, or add --force");
-  }
-  if (const std::string part = part_of(options.output); !options.force && fs::exists(part)) {
-    throw std::runtime_error(
-        part +
-        " exists: another recording waits for its first frame, or was killed while it did; "
-        "name another file, or add --force");
-  }
   Recording recording(context, options);
   try {
     recording.run();

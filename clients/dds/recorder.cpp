@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <stdexcept>
 #include <string_view>
 #include <utility>
 
@@ -27,7 +28,7 @@ std::string ros_name(std::string name) {
 
 }  // namespace
 
-Recorder::Recorder(Graph& graph, const std::filesystem::path& file, bool replace)
+Recorder::Recorder(Graph& graph, const std::string& file, bool replace)
     : sink_(file, replace),
       writer_(sink_, {.library = "dtact-dds " DTACT_VERSION, .profile = "ros2"}),
       waitset_(graph.make_waitset()) {
@@ -42,8 +43,9 @@ Recorder::Recorder(Graph& graph, const std::filesystem::path& file, bool replace
       schema = writer_.add_schema(ros_name(type->name), "ros2msg", type->definition);
     }
     const dds_entity_t reader = graph.subscribe(one, waitset_);
-    channels_[reader] =
-        writer_.add_channel(schema, one.topic, "cdr", {{"topic_type_hash", type->hash}});
+    channels_[reader] = {
+        writer_.add_channel(schema, one.topic, "cdr", {{"topic_type_hash", type->hash}}),
+        one.topic != "/tf_static" && one.topic != "/diagnostics"};
   }
   thread_ = std::thread([this] { run(); });
 }
@@ -69,6 +71,7 @@ std::uint64_t Recorder::finish() {
     if (!failure_) throw;  // else the first one says more
   }
   if (failure_) std::rethrow_exception(failure_);
+  if (!named_) throw std::runtime_error("no message of a sensor came: dtactctl status says why");
   return messages_;
 }
 
@@ -89,7 +92,7 @@ void Recorder::run() {
   }
 }
 
-void Recorder::take(dds_entity_t reader, std::uint16_t channel) {
+void Recorder::take(dds_entity_t reader, const Channel& channel) {
   // Not without end: on a slow disk more may come than are written.
   for (std::int32_t i = 0; i < Graph::kMaxUnread; ++i) {
     ddsi_serdata* message = nullptr;
@@ -101,9 +104,10 @@ void Recorder::take(dds_entity_t reader, std::uint16_t channel) {
     }
     ddsi_serdata_unref(message);
     if (!info.valid_data) continue;
-    writer_.add(mcap::Message{channel, static_cast<std::uint32_t>(messages_++),
+    writer_.add(mcap::Message{channel.id, static_cast<std::uint32_t>(messages_++),
                               static_cast<std::uint64_t>(ros_now()),
                               static_cast<std::uint64_t>(info.source_timestamp), buffer_});
+    if (channel.of_sensor && !std::exchange(named_, true)) sink_.give_name();
   }
 }
 

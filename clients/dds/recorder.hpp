@@ -5,11 +5,12 @@
 #include <atomic>
 #include <cstdint>
 #include <exception>
-#include <filesystem>
 #include <map>
+#include <string>
 #include <thread>
 
 #include "clients/dds/graph.hpp"
+#include "clients/recording/part_file_sink.hpp"
 #include "hal/files/mcap_writer.hpp"
 
 namespace dtact::dds {
@@ -19,30 +20,36 @@ namespace dtact::dds {
 /// a thread of its own.
 class Recorder {
  public:
-  /// Of the topics that `graph` has by now. `replace`: a file of that name is replaced; else it is
-  /// an error. `graph` must outlive this.
-  Recorder(Graph& graph, const std::filesystem::path& file, bool replace);
+  /// Of the topics that `graph` has by now. `replace`: a file of that name is replaced once a
+  /// sensor's message has come; else it is an error. `graph` must outlive this.
+  Recorder(Graph& graph, const std::string& file, bool replace);
   ~Recorder();
   Recorder(const Recorder&) = delete;
   Recorder& operator=(const Recorder&) = delete;
 
   /// The file could not be written; finish() throws why.
   [[nodiscard]] bool failed() const noexcept { return failed_; }
-  /// Closes the file, also after a failure, and returns the number of messages.
+  /// Closes the file, also after a failure, and returns the number of messages. Without one of a
+  /// sensor the file is removed, and it throws.
   std::uint64_t finish();
   /// Messages that came while Graph::kMaxUnread of their topic waited for the disk. After finish().
   [[nodiscard]] std::uint64_t lost() const noexcept { return lost_; }
 
  private:
   void run();
-  void take(dds_entity_t reader, std::uint16_t channel);
+  struct Channel {
+    std::uint16_t id;
+    bool of_sensor;  ///< Not one that the bridge fills without a sensor.
+  };
+  void take(dds_entity_t reader, const Channel& channel);
 
-  mcap::FileSink sink_;
+  recording::PartFileSink sink_;
   mcap::Writer writer_;
   dds_entity_t waitset_;
-  std::map<dds_entity_t, std::uint16_t> channels_;  ///< By reader.
+  std::map<dds_entity_t, Channel> channels_;  ///< By reader.
   std::string buffer_;
   std::uint64_t messages_ = 0;
+  bool named_ = false;  ///< A sensor's message has come.
   std::uint64_t lost_ = 0;
   std::atomic<bool> ending_ = false;
   std::atomic<bool> failed_ = false;

@@ -8,13 +8,13 @@
 #include <optional>
 #include <ostream>
 #include <stdexcept>
-#include <system_error>
 
 #include "clients/calibrate/reprocess/depth_reprocessor.hpp"
 #include "clients/common/interruptible.hpp"
 #include "clients/common/json.hpp"
 #include "clients/common/reports.pb.h"
 #include "clients/recording/channels.hpp"
+#include "clients/recording/part_file_sink.hpp"
 #include "clients/recording/read_recording.hpp"
 #include "clients/recording/recording_writer.hpp"
 #include "hal/base/atomic_file.hpp"
@@ -83,9 +83,6 @@ int jpeg_scale_of(const mcap::Reader& file, int frame_width) {
   return 1;
 }
 
-/// The file until it is whole: a failure, or Ctrl-C, leaves the one before.
-fs::path part_of(const std::string& output) { return output + ".part"; }
-
 class Reprocessor {
  public:
   Reprocessor(const Options& options, const cli::Context& context)
@@ -98,7 +95,7 @@ class Reprocessor {
         remaker_(calibration::for_scaled_frames(calibration_, frame_scale_)),
         decoder_(frame_width() * jpeg_scale_, frame_height() * jpeg_scale_, jpeg_scale_),
         luma_(frame_width(), frame_height()),
-        sink_(part_of(options.output), true),
+        sink_(options.output, options.force),
         writer_(sink_, {.program = context.target.program}) {}
 
   void run() {
@@ -123,7 +120,7 @@ class Reprocessor {
     }
     writer_.finish();
     sink_.sync();
-    fs::rename(part_of(options_.output), options_.output);
+    sink_.give_name();
   }
 
   /// See DepthReprocessor::unsharpened().
@@ -293,7 +290,7 @@ class Reprocessor {
   DepthReprocessor remaker_;
   hal::mjpeg::GreyDecoder decoder_;
   hal::luma::LumaBuffer luma_;
-  mcap::FileSink sink_;
+  recording::PartFileSink sink_;
   recording::RecordingWriter writer_;
   std::string reference_png_;         // the PNG of the reference in use
   std::uint64_t reference_at_ = 0;    // its place in the file
@@ -304,21 +301,12 @@ class Reprocessor {
 };
 
 void run(const cli::Context& context, const Options& options) {
-  if (!options.force && fs::exists(options.output)) {
-    throw std::runtime_error(options.output + " exists: name another file, or add --force");
-  }
   if (fs::exists(options.output) && fs::equivalent(options.recording, options.output)) {
     throw std::runtime_error(options.output + " is the recording itself: name another file");
   }
   const cli::Interruptible while_writing;
   Reprocessor reprocessor(options, context);
-  try {
-    reprocessor.run();
-  } catch (...) {
-    std::error_code ignored;
-    fs::remove(part_of(options.output), ignored);
-    throw;
-  }
+  reprocessor.run();
   const auto report = reprocessor.report();
   if (context.json) {
     context.out << cli::json_line(report);

@@ -12,6 +12,7 @@
 #include <future>
 #include <iostream>
 #include <optional>
+#include <sstream>
 #include <stdexcept>
 #include <string>
 #include <thread>
@@ -21,6 +22,7 @@
 #include "clients/dds/messages.hpp"
 #include "clients/dds/ros2.h"
 #include "clients/dds/sensor.hpp"
+#include "hal/base/atomic_file.hpp"
 #include "tests/fakes/own_path.hpp"
 #include "tests/unit/client/played_daemon.hpp"
 #include "tests/unit/web/no_descriptors.hpp"
@@ -236,6 +238,23 @@ TEST_F(Dds, ALimitOnTheFilesSizeIsAnError) {
                std::cout, std::cerr);
   };
   EXPECT_EXIT(std::exit(record()), testing::ExitedWithCode(1), "File too large");
+  std::filesystem::remove(file);
+}
+
+// Before: --force emptied the earlier recording at once.
+TEST_F(Dds, ARecordingWithoutASensorLeavesTheEarlierOne) {
+  graph.reset();
+  const std::string file = fakes::own_path(".mcap").string();
+  base::write_file_atomically(file, "earlier");
+  std::ostringstream out;
+  std::ostringstream error;
+  EXPECT_EQ(run({"--host", "unix:/no/such/socket", "--domain", std::to_string(domain), "--record",
+                 file, "--force", "--seconds", "0.1"},
+                out, error),
+            1);
+  EXPECT_NE(error.str().find("no message of a sensor came"), std::string::npos) << error.str();
+  EXPECT_EQ(base::read_file(file), "earlier");
+  EXPECT_FALSE(std::filesystem::exists(file + ".part"));
   std::filesystem::remove(file);
 }
 

@@ -45,7 +45,7 @@ ROOMS = {
     "clients/perceive/pose": ["clients/geometry"],
     "clients/perceive/recognition": ["clients/geometry", "hal/base", "hal/files", "proto"],
     "clients/common": ["daemon/serve", "hal/base", "hal/files", "proto", "daemon/recon", "clients/cpp", "clients/geometry"],
-    "clients/recording": ["hal/files", "proto", "clients/cpp"],
+    "clients/recording": ["hal/base", "hal/files", "proto", "clients/cpp"],
     "clients/calibrate/fit": ["hal/files", "daemon/recon", "daemon/calibration"],
     "clients/calibrate/fit/model": ["daemon/recon", "daemon/calibration", "clients/calibrate/fit"],
     "clients/calibrate/lens": ["daemon/recon"],
