@@ -1,11 +1,12 @@
 #include "clients/ctl/export.hpp"
 
+#include <fcntl.h>
 #include <fmt/format.h>
+#include <sys/file.h>
 
 #include <cerrno>
 #include <charconv>
 #include <cstdint>
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <limits>
@@ -22,11 +23,13 @@
 
 #include "clients/common/depth_file.hpp"
 #include "clients/common/depth_message.hpp"
+#include "clients/common/interruptible.hpp"
 #include "clients/common/json.hpp"
 #include "clients/common/reports.pb.h"
 #include "clients/cpp/maps.hpp"
 #include "clients/cpp/names.hpp"
 #include "clients/recording/read_recording.hpp"
+#include "hal/base/unique_fd.hpp"
 
 namespace dtact::ctl {
 namespace {
@@ -232,6 +235,9 @@ class Exporter {
 
  private:
   bool take(const v1::Frame& frame, std::uint64_t time) {
+    if (cli::Interruptible::happened()) {
+      throw std::runtime_error("interrupted: nothing was written");
+    }
     const std::uint64_t index = next_++;
     if (index >= range_.last) return false;
     if (index < range_.first) return true;
@@ -283,44 +289,71 @@ void remove_earlier(const fs::path& folder) {
   for (const fs::path& file : earlier) fs::remove(file);
 }
 
-/// A new folder within `folder`, where its files can be renamed from.
-fs::path make_folder_in(const fs::path& folder) {
-  std::string path = folder / ".export.XXXXXX";
-  if (::mkdtemp(path.data()) == nullptr) {
-    throw std::system_error(errno, std::generic_category(), folder.string());
+constexpr const char* kUnfinished = ".dtactctl-export";
+
+/// What is in the folder, without an export that did not come to its end.
+std::vector<fs::path> files_in(const fs::path& folder) {
+  std::vector<fs::path> files;
+  for (const auto& entry : fs::directory_iterator(folder)) {
+    if (entry.path().filename() != kUnfinished) files.push_back(entry.path());
   }
-  return path;
+  return files;
 }
 
-/// Puts the files of a whole export in the place of an earlier one's.
-void replace_earlier(const fs::path& folder, const fs::path& fresh) {
-  std::vector<fs::path> files;
-  for (const auto& entry : fs::directory_iterator(fresh)) files.push_back(entry.path());
-  remove_earlier(folder);
-  for (const fs::path& file : files) fs::rename(file, folder / file.filename());
-}
+/// The folder of an export within the one it is for, until it is whole: an earlier export stays
+/// until then. What a killed export left there goes.
+class Unfinished {
+ public:
+  /// Throws std::runtime_error where another program exports there.
+  explicit Unfinished(const fs::path& folder) : folder_(folder), path_(folder / kUnfinished) {
+    fs::create_directories(path_);
+    lock_.reset(::open(path_.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+    if (lock_ && ::flock(lock_.get(), LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK) {
+      throw std::runtime_error(folder_.string() + ": another program is exporting to it");
+    }
+    for (const fs::path& file : files_in(path_)) fs::remove_all(file);
+  }
+  ~Unfinished() {
+    std::error_code ignored;
+    if (!whole_) fs::remove_all(path_, ignored);
+  }
+  Unfinished(const Unfinished&) = delete;
+  Unfinished& operator=(const Unfinished&) = delete;
+
+  [[nodiscard]] const fs::path& path() const { return path_; }
+  /// Puts the files in the place of an earlier export's. Where that fails they stay, and the
+  /// std::runtime_error says where.
+  void finish() {
+    whole_ = true;
+    try {
+      remove_earlier(folder_);
+      for (const fs::path& file : files_in(path_)) fs::rename(file, folder_ / file.filename());
+      fs::remove(path_);
+    } catch (const fs::filesystem_error& e) {
+      throw std::runtime_error(fmt::format("{}; the export is in {}", e.what(), path_.string()));
+    }
+  }
+
+ private:
+  fs::path folder_;
+  fs::path path_;
+  base::UniqueFd lock_;  ///< It ends with the program, however that ends.
+  bool whole_ = false;
+};
 
 void run_export(const cli::Context& context, const ExportOptions& options) {
+  const cli::Interruptible while_writing;
   const mcap::Reader file(options.recording);
-  if (!options.force && fs::exists(options.output) && !fs::is_empty(options.output)) {
+  if (!options.force && fs::exists(options.output) && !files_in(options.output).empty()) {
     throw std::runtime_error(options.output + " is not empty: name another folder, or add --force");
   }
-  fs::create_directories(options.output);
-  // An earlier export stays until this one is whole.
-  const fs::path fresh = make_folder_in(options.output);
+  Unfinished unfinished(options.output);
+  Exporter exporter(options, unfinished.path());
+  exporter.run(file);
+  unfinished.finish();
   cli::RecordingReport report;
-  try {
-    Exporter exporter(options, fresh);
-    exporter.run(file);
-    replace_earlier(options.output, fresh);
-    report.set_frames(exporter.frames());
-    report.set_maps(exporter.maps());
-  } catch (...) {
-    std::error_code ignored;
-    fs::remove_all(fresh, ignored);
-    throw;
-  }
-  fs::remove(fresh);
+  report.set_frames(exporter.frames());
+  report.set_maps(exporter.maps());
   report.set_output(options.output);
   report.set_damage(file.damage());
   report.set_out_of_order(file.out_of_order());

@@ -1,9 +1,16 @@
 // dtactctl export, on a recording that the test makes.
+#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <pthread.h>
+#include <sys/file.h>
 
+#include <chrono>
+#include <csignal>
 #include <set>
 #include <sstream>
+#include <stop_token>
+#include <thread>
 
 #include "clients/ctl/ctl.hpp"
 #include "clients/recording/recording_writer.hpp"
@@ -155,6 +162,60 @@ TEST_F(Export, LeavesNoStackThatIsNotWhole) {
   EXPECT_EQ(run({"--to", "npy"}), 1);
   EXPECT_THAT(said_, HasSubstr("export them apart by --frames"));
   EXPECT_TRUE(fs::is_empty(out_));
+}
+
+// Before: a hidden folder with all that was written stayed, and the next export was refused.
+TEST_F(Export, CtrlCLeavesNothing) {
+  {
+    mcap::FileSink sink(file_, true);
+    RecordingWriter writer(sink, {.program = "test", .pictures_hz = 0});
+    for (std::uint64_t i = 0; i < 5000; ++i) writer.add(sample_frame(10 + i));
+    writer.finish();
+  }
+  // The program's own handler takes its place for as long as it writes.
+  const auto before = std::signal(SIGINT, [](int) {});
+  int code = 0;
+  {
+    const std::jthread user([program = ::pthread_self()](const std::stop_token& stop) {
+      while (!stop.stop_requested()) {
+        ::pthread_kill(program, SIGINT);
+        std::this_thread::sleep_for(std::chrono::microseconds(200));
+      }
+    });
+    code = run({"--to", "png"});
+  }
+  (void)std::signal(SIGINT, before);
+  EXPECT_EQ(code, 1);
+  EXPECT_THAT(said_, HasSubstr("interrupted: nothing was written"));
+  EXPECT_TRUE(fs::is_empty(out_));
+}
+
+TEST_F(Export, WhatAKilledOneLeftGoes) {
+  fs::create_directories(out_ / ".dtactctl-export" / "more");
+  base::write_file_atomically(out_ / ".dtactctl-export" / "depth.npy", "half");
+  ASSERT_EQ(run({"--to", "csv"}), 0) << said_;
+  std::set<std::string> names;
+  for (const auto& entry : fs::directory_iterator(out_)) names.insert(entry.path().filename());
+  EXPECT_THAT(names, ElementsAre("events.csv", "frames.csv"));
+}
+
+TEST_F(Export, LeavesTheFolderToAnotherProgramThatExportsThere) {
+  const fs::path unfinished = out_ / ".dtactctl-export";
+  fs::create_directories(unfinished);
+  base::write_file_atomically(unfinished / "depth.npy", "half");
+  const base::UniqueFd other(::open(unfinished.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  ASSERT_EQ(::flock(other.get(), LOCK_EX | LOCK_NB), 0);
+  EXPECT_EQ(run({"--to", "csv"}), 1);
+  EXPECT_THAT(said_, HasSubstr("another program is exporting to it"));
+  EXPECT_EQ(base::read_file(unfinished / "depth.npy"), "half");
+}
+
+// Before: the earlier export was gone, and the new one with it.
+TEST_F(Export, OneThatCannotTakeTheEarlierOnesPlaceStays) {
+  fs::create_directories(out_ / "events.csv" / "mine");
+  EXPECT_EQ(run({"--to", "csv", "--force"}), 1);
+  EXPECT_THAT(said_, HasSubstr("the export is in " + (out_ / ".dtactctl-export").string()));
+  EXPECT_TRUE(fs::exists(out_ / ".dtactctl-export" / "frames.csv"));
 }
 
 TEST_F(Export, SaysWhatIsWrong) {
