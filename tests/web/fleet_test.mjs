@@ -102,6 +102,18 @@ test("a sensor that the gateway has no longer leaves the list", async () => {
   await shown(1);
 });
 
+// Before: the panes that were shown were closed, and their recordings ended.
+test("panes stay while a gateway that was started again finds no sensor yet", async () => {
+  const panes = view.page.locator(".pane");
+  const buttons = view.page.locator(".chooser button");
+  assert.equal(await panes.count(), 2);
+  await view.page.route("**/sensors", (route) => route.fulfill({ json: [] }));
+  await until(() => buttons.count(), (count) => count === 0, 10_000);
+  await view.page.unroute("**/sensors");
+  await until(() => buttons.count(), (count) => count === 4, 10_000);
+  assert.equal(await panes.count(), 2);
+});
+
 test("a refused token does not hide one that is good", async () => {
   const enter = (...names) =>
     view.page.evaluate((names) => {

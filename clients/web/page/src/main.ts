@@ -122,7 +122,8 @@ class Page {
       made.title = error ?? "connected";
       made.setAttribute("aria-pressed", String(this.shown.has(name)));
     }
-    if (fresh) for (const name of first) this.toggle(name);
+    // Panes stay while a gateway that was started again looks for its sensors.
+    if (fresh) for (const name of first) if (!this.shown.has(name)) this.toggle(name);
     if (sensors.length === 0) this.tell("dtact-web has no sensor: see its --help.");
     this.fleetButton.hidden = sensors.length < 2;
     this.chooser.hidden = sensors.length < 2 || this.fleet.shown;
