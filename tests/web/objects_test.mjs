@@ -135,6 +135,39 @@ test("what is no name, or ended early, stores nothing", async () => {
   assert.deepEqual(readdirSync(taught), []);
 });
 
+/** A socket's end is reported late, as over a slow network. */
+function reportLate() {
+  window.WebSocket = class extends WebSocket {
+    set onclose(handler) {
+      super.onclose = (event) => setTimeout(() => handler.call(this, event), 4000);
+    }
+  };
+}
+
+// Before: it was taken for the end of the lesson that ran by then.
+test("the end of an earlier lesson leaves the next one", async () => {
+  const folders = ["--work-folder", path.join(work, "late"), "--taught", path.join(work, "late-taught")];
+  const late = await open(await startGateway({ left: left.port }, folders), { before: reportLate });
+  try {
+    const objects = late.page.locator('[data-sensor="left"]').getByRole("group", { name: "Taught objects" });
+    await objects.getByRole("heading", { name: "Taught objects" }).click();
+    await objects.getByRole("button", { name: "Teach…" }).click();
+    const lesson = late.page.getByRole("dialog", { name: "Teach an object" });
+    const alert = () => lesson.locator('[role="alert"]').textContent();
+    await lesson.getByLabel("Name of the object").fill("--help");
+    await lesson.getByRole("button", { name: "Begin" }).click();
+    await until(alert, (text) => text.includes("is no name of an object"), 10_000);
+    await lesson.getByLabel("Name of the object").fill("lid");
+    await lesson.getByRole("button", { name: "Begin" }).click();
+    await new Promise((done) => setTimeout(done, 5000));
+    assert.equal(await alert(), "");
+    await lesson.getByRole("button", { name: "end without storing anything" }).click();
+    await until(alert, (text) => text.includes("nothing is stored"), 10_000);
+  } finally {
+    await late.close();
+  }
+});
+
 test("one that may only look may not teach", async () => {
   const { file, token } = tokenFile("view");
   const viewer = await open(await startGateway({ left: left.port }, ["--tokens", file]));

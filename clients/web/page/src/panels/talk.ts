@@ -64,17 +64,22 @@ export class Talk {
     this.session.hidden = false;
     this.said.replaceChildren();
     say(this.trouble, "");
-    this.socket = converse(
+    // A slow network reports the end of an earlier session while this one runs.
+    const socket = converse(
       this.sensor,
       start,
       (line) => {
+        if (socket !== this.socket) return;
         if (line.case === "text") this.tell(line.value);
         else if (line.case === "started") this.tell("Every image is saved as soon as it is taken.");
         else if (line.case === "scene") void this.show(line.value);
         else if (line.case === "ended") this.end(line.value.error);
       },
-      () => this.end(`The connection was lost. ${resume}`),
+      () => {
+        if (socket === this.socket) this.end(`The connection was lost. ${resume}`);
+      },
     );
+    this.socket = socket;
   }
 
   /** Ends the session, if it still runs. */
