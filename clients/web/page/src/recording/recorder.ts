@@ -21,7 +21,7 @@ export interface Recorded {
   why?: string;
 }
 
-export interface Source {
+interface Source {
   /** Undefined where no answer will come. */
   ask(request: Request): Promise<Reply | undefined>;
   features(): string[];

@@ -5,7 +5,7 @@ import type { Event, Frame, HelloReply, Reply } from "../../gen/dtact_pb";
 import { framed, unframed } from "../wire/framing";
 import type { Link, Request } from "./messages";
 
-export interface Listener {
+interface Listener {
   link(link: Link): void;
   hello(hello: HelloReply): void;
   reply(id: number, reply: Reply): void;

@@ -18,7 +18,7 @@ export class Refusal extends Error {
 
 type Result = Exclude<Reply["result"], { case: "error" } | { case: undefined }>;
 
-export interface Watcher {
+interface Watcher {
   link(link: Link): void;
   hello(hello: HelloReply): void;
   /** The newest frame, at most once a drawn picture; false: it is not shown, the one before stays. */

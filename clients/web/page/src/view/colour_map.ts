@@ -63,11 +63,3 @@ export const colourMap: Uint8Array = makeColours();
 
 /** Deeper than the range: a colour that the map does not have. */
 export const BEYOND: readonly [number, number, number] = [255, 138, 128];
-
-/** The colour of a depth within a range, as CSS has it. */
-export function colourOf(mm: number, fromMm: number, toMm: number): string {
-  if (mm > toMm) return `rgb(${BEYOND.join(" ")})`;
-  const share = Math.min(Math.max((mm - fromMm) / (toMm - fromMm), 0), 1);
-  const at = 4 * Math.min(COLOURS - 1, Math.floor(share * COLOURS));
-  return `rgb(${colourMap[at]} ${colourMap[at + 1]} ${colourMap[at + 2]})`;
-}

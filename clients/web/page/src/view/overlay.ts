@@ -38,7 +38,7 @@ export function truePlace({ footXMm, footYMm, perMm }: Viewpoint, seen: Place, d
 }
 
 /** Where a point appears at `place` and is pressed in by `depthMm`. */
-export function seenPlace({ footXMm, footYMm, perMm }: Viewpoint, place: Place, depthMm: number): Place {
+function seenPlace({ footXMm, footYMm, perMm }: Viewpoint, place: Place, depthMm: number): Place {
   const rest = 1 - perMm * depthMm;
   return {
     xMm: footXMm + (place.xMm - footXMm) / rest,
@@ -76,7 +76,7 @@ export interface Marks {
 }
 
 /** A length in round millimetres of about a fifth of what is shown. */
-export function scaleLength(grid: Grid, zoom: Zoom): number {
+function scaleLength(grid: Grid, zoom: Zoom): number {
   const fifth = (grid.width * grid.mmPerPx) / zoom.factor / 5;
   return LENGTHS_MM.reduce((best, length) => (length <= fifth * 1.05 ? length : best));
 }

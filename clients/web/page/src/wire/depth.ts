@@ -3,7 +3,7 @@
 import { unzstd } from "./zstd";
 
 /** dtact.v1.DepthEncoding. */
-export const DEPTH_INT16 = 1;
+const DEPTH_INT16 = 1;
 export const DEPTH_PREDICT_ZSTD = 2;
 
 /** Largest number of values in a message; a decoder allocates for no more. */

@@ -4,7 +4,7 @@ import { decompress } from "fzstd";
 const MAGIC = 0xfd2fb528;
 
 /** What the frame's head says its content's size is, bytes; it is refused when it says nothing. */
-export function contentSize(frame: Uint8Array): number {
+function contentSize(frame: Uint8Array): number {
   const view = new DataView(frame.buffer, frame.byteOffset, frame.byteLength);
   if (frame.length < 6 || view.getUint32(0, true) !== MAGIC) throw new Error("no zstd frame");
   const descriptor = view.getUint8(4);
