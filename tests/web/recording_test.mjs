@@ -8,7 +8,7 @@ import path from "node:path";
 import { after, before, test } from "node:test";
 import { fact, open, until } from "./browser.mjs";
 import { calibration, startDaemon, startGateway, stopAll, work } from "./programs.mjs";
-import { Tap } from "./tap.mjs";
+import { fields, Tap } from "./tap.mjs";
 
 let daemon;
 let tap;
@@ -39,19 +39,21 @@ const { McapStreamReader, McapWriter } = createRequire(path.resolve(process.env.
   "@mcap/core",
 );
 
-/** Sequences of the messages of a topic, as they stand in the file. */
-function sequencesOf(recording, topic) {
+/** The records of a recording of the page, as they stand in the file. */
+function* recordsOf(recording) {
   const reader = new McapStreamReader();
   reader.append(readFileSync(recording));
-  const channels = new Map();
-  const sequences = [];
-  for (let record = reader.nextRecord(); record; record = reader.nextRecord()) {
-    if (record.type === "Channel") channels.set(record.id, record.topic);
-    if (record.type !== "Message" || channels.get(record.channelId) !== topic) continue;
-    sequences.push(record.sequence);
-  }
-  return sequences;
+  for (let record = reader.nextRecord(); record; record = reader.nextRecord()) yield record;
 }
+
+/** The messages of a topic. */
+function messagesOf(recording, topic) {
+  const records = [...recordsOf(recording)];
+  const ids = records.filter((one) => one.type === "Channel" && one.topic === topic).map(({ id }) => id);
+  return records.filter((one) => one.type === "Message" && ids.includes(one.channelId));
+}
+
+const sequencesOf = (recording, topic) => messagesOf(recording, topic).map(({ sequence }) => sequence);
 
 const ctl = (...words) => execFileSync(process.env.DTACTCTL, words, { encoding: "utf8" });
 
@@ -134,6 +136,24 @@ test("what is recorded is what the daemon sent", async () => {
       }
     }
   }
+});
+
+/** Of Frame in dtact.proto. */
+const LUMA = 12;
+
+// Before: half a megabyte more a frame, so that a recording ended at its largest size in half the time.
+test("grey levels that the view asks for are not recorded beside the JPEG", async () => {
+  await pane.getByRole("radio", { name: "Camera" }).click();
+  await until(
+    () => pane.locator("canvas.map").getAttribute("width"),
+    (width) => width === "800",
+  );
+  const file = await record(() => pane.getByRole("button", { name: "Stop" }).click());
+  await pane.getByRole("radio", { name: "Depth" }).click();
+  const frames = messagesOf(file, "/dtact/frame").map(({ data }) => fields(Buffer.from(data)));
+  assert.ok(frames.length > 20, `${frames.length} frames`);
+  assert.equal(frames.filter((frame) => LUMA in frame).length, 0);
+  assert.equal(sequencesOf(file, "/camera/jpeg").length, frames.length);
 });
 
 test("depth can be made anew from it", async () => {

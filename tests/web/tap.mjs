@@ -7,7 +7,7 @@ const HELLO = [8, 1, 0x12, 7, 8, 1, 0x10, 1, 0x1a, 1, 0x78]; // id 1, version 1.
 const SUBSCRIBE = [8, 2, 0x1a, 2, 8, 1]; // id 2, depth: DEPTH_INT16
 
 /** The fields of a message by number: bigint, Buffer (of 8 or 4 bytes for fixed ones), the last one. */
-function fields(message) {
+export function fields(message) {
   const found = {};
   let at = 0;
   const varint = () => {

@@ -16,7 +16,7 @@ const SECOND_NS = 1_000_000_000n;
 const PICTURE_NS = SECOND_NS / 10n;
 
 /** What describes frames beside themselves. */
-export interface Attachment {
+interface Attachment {
   name: "calibration.toml" | "reference.png" | "current_reference.png";
   mediaType: string;
   data: Uint8Array;
@@ -87,6 +87,8 @@ export class Recording {
   addFrame(frame: Frame): void {
     this.now = this.momentOf(frame);
     const { jpeg, ...rest } = frame;
+    // Only the page's view asked for it; the JPEG is the same picture.
+    delete rest.luma;
     const timestamp = create(TimestampSchema, {
       seconds: this.now.logTime / SECOND_NS,
       nanos: Number(this.now.logTime % SECOND_NS),
