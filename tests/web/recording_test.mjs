@@ -209,6 +209,8 @@ for (const [by, make] of [
     );
     const [at, length] = (await fact(player, "played").textContent()).split(" of ");
     assert.equal(at, length);
+    // A recording does not say when its reference was taken.
+    assert.equal(await fact(player, "reference").textContent(), "–");
     await until(
       () => player.getAttribute("data-sequence"),
       (sequence) => Number(sequence) === frames.at(-1).sequence,
@@ -251,6 +253,67 @@ for (const [by, make] of [
     assert.equal(await player.count(), 0);
   });
 }
+
+/** Where two pictures differ by the largest amount, and their grey levels there. */
+const largestDifference = (one, other) =>
+  view.page.evaluate(
+    async (pictures) => {
+      const greys = [];
+      let size;
+      for (const base64 of pictures) {
+        const bytes = Uint8Array.from(atob(base64), (c) => c.charCodeAt(0));
+        const bitmap = await createImageBitmap(new Blob([bytes]), { colorSpaceConversion: "none" });
+        size = { width: bitmap.width, height: bitmap.height };
+        const context = new OffscreenCanvas(size.width, size.height).getContext("2d");
+        context.drawImage(bitmap, 0, 0);
+        greys.push(context.getImageData(0, 0, size.width, size.height).data.filter((_, i) => i % 4 === 0));
+      }
+      let at = 0;
+      const apart = (i) => Math.abs(greys[0][i] - greys[1][i]);
+      for (let i = 0; i < greys[0].length; ++i) if (apart(i) > apart(at)) at = i;
+      return { ...size, row: Math.floor(at / size.width), column: at % size.width, greys: greys.map((grey) => grey[at]) };
+    },
+    [one, other].map((png) => Buffer.from(png).toString("base64")),
+  );
+
+// Before: from the reference of the moment at which the view was chosen.
+test("the difference is taken from the reference of the frame that is shown", async () => {
+  const file = await record(async () => {
+    await until(
+      () => fact(pane, "inContact").textContent(),
+      (text) => text === "in contact",
+    );
+    ctl("--port", String(daemon.port), "rezero", "--force");
+    await new Promise((done) => setTimeout(done, 2000));
+    await pane.getByRole("button", { name: "Stop" }).click();
+  });
+  const references = [...recordsOf(file)].filter(
+    ({ type, name }) => type === "Attachment" && name === "current_reference.png",
+  );
+  assert.ok(references.length > 1, `${references.length} references`);
+  const { width, height, row, column, greys } = await largestDifference(references[0].data, references.at(-1).data);
+  assert.ok(Math.abs(greys[0] - greys[1]) > 20, greys.join());
+  const player = await play(file);
+  await player.getByRole("radio", { name: "Difference" }).click();
+  const box = await player.locator("canvas.marks").boundingBox();
+  await view.page.mouse.move(
+    box.x + ((column + 0.5) / width) * box.width,
+    box.y + ((row + 0.5) / height) * box.height,
+  );
+  const reference = async () =>
+    Number(/reference (\d+) ·/.exec(await player.locator(".readout").textContent())?.[1]);
+  await until(reference, (grey) => Math.abs(grey - greys[1]) <= 2);
+  await until(
+    () => player.getByRole("button", { name: "Resume" }).count(),
+    (count) => count === 1,
+  );
+  await player.getByLabel("Time in the recording").evaluate((input) => {
+    input.value = "0";
+    input.dispatchEvent(new Event("input"));
+  });
+  await until(reference, (grey) => Math.abs(grey - greys[0]) <= 2);
+  await close(player);
+});
 
 test("one that is paused while it is opened shows its first frame, and plays from there", async () => {
   const file = path.join(work, "paused.mcap");

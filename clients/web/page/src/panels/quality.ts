@@ -59,7 +59,13 @@ export class QualityPanel {
   event(event: Event): void {
     if (event.what.case !== "reference") return;
     const { sequence, restored } = event.what.value;
-    this.reference = { sequence: Number(sequence), restored };
+    this.measuredFrom(sequence, restored);
+  }
+
+  /** The last frame of the reference; 0 in a recording, which does not say it. */
+  private measuredFrom(sequence: bigint, restored: boolean): void {
+    this.reference = sequence > 0n ? { sequence: Number(sequence), restored } : undefined;
+    if (!this.reference) this.facts.set("reference", "–");
   }
 
   /** After connecting: events report only later changes. */
@@ -72,9 +78,8 @@ export class QualityPanel {
         case: "getReference",
         value: create(GetReferenceSchema),
       });
-      if (result.case === "reference") {
-        this.reference ??= { sequence: Number(result.value.sequence), restored: false };
-      }
+      if (result.case === "reference" && !this.reference)
+        this.measuredFrom(result.value.sequence, false);
     } catch {
       // There is none yet; an event reports when one is taken.
     }

@@ -6,8 +6,10 @@ import { decompress } from "fzstd";
 import {
   CalibrationFilesSchema,
   ErrorCode,
+  EventSchema,
   FrameSchema,
   HelloReplySchema,
+  ReferenceEventSchema,
   ReferenceImageSchema,
   ReplySchema,
   Rights,
@@ -94,6 +96,8 @@ export class Player {
   private readonly damaged = new Set<string>();
   private reason = "";
   private shown: Frame | undefined;
+  /** Where the reference of the frame shown stands in the file. */
+  private reference: bigint | undefined;
 
   constructor(
     private readonly file: File,
@@ -259,6 +263,7 @@ export class Player {
       const wire = fromBinary(FrameSchema, message.data);
       const frame = unpack(wire, this.spare, undefined, 0, behind);
       this.shown = wire;
+      this.followReference();
       if (picture && this.wants.luma)
         frame.luma = await greyOf(fromBinary(CompressedImageSchema, picture.data).data);
       const maps = [frame.depth, frame.luma, frame.cloud];
@@ -272,6 +277,16 @@ export class Player {
       this.underWay = false;
       this.report();
     }
+  }
+
+  /** Tells the page when another reference applies, as a daemon does: after a re-zero, or a jump. */
+  private followReference(): void {
+    const offset = this.newest("current_reference.png")?.offset;
+    const before = this.reference;
+    this.reference = offset;
+    if (before === undefined || offset === before) return;
+    const what = { case: "reference", value: create(ReferenceEventSchema) } as const;
+    this.post({ kind: "event", event: create(EventSchema, { what }) });
   }
 
   private report(): void {
@@ -319,12 +334,18 @@ export class Player {
     return undefined;
   }
 
-  /** The newest up to the frame shown, else the first. */
+  /** The attachment that applies to the frame shown: the newest up to its time, else the first. */
+  private newest(name: string): McapTypes.TypedMcapRecords["AttachmentIndex"] | undefined {
+    const all = (this.reader?.attachmentIndexes ?? []).filter((one) => one.name === name);
+    return all.filter(({ logTime }) => logTime <= this.at).at(-1) ?? all[0];
+  }
+
   private async attached(name: string): Promise<Uint8Array | undefined> {
+    const wanted = this.newest(name)?.logTime;
+    if (wanted === undefined) return undefined;
     let found: Uint8Array | undefined;
-    for await (const { logTime, data } of this.reader?.readAttachments({ name }) ?? []) {
-      if (!found || logTime <= this.at) found = data;
-    }
+    const times = { startTime: wanted, endTime: wanted };
+    for await (const { data } of this.reader?.readAttachments({ name, ...times }) ?? []) found = data;
     return found;
   }
 }
