@@ -386,6 +386,26 @@ test("the surface is loaded when it is looked at", async () => {
   await pane.getByRole("radio", { name: "Depth" }).click();
 });
 
+// Before: an empty view, without a word.
+test("a part of the page that is gone after an update is named", async () => {
+  const other = await open(gateway);
+  try {
+    await other.page.route(/surface-[^/]*\.js/, (route) => route.fulfill({ status: 404 }));
+    const sensor = other.page.locator('[data-sensor="left"]');
+    await sensor.getByRole("radio", { name: "Surface" }).click();
+    await until(
+      () => sensor.locator(".notice").first().textContent(),
+      (text) => text.includes("Reload it"),
+      10_000,
+    );
+    // The console reports the missing file.
+    const reported = other.complaints.splice(0);
+    assert.ok(reported.every((text) => text.includes("404")), reported.join("\n"));
+  } finally {
+    await other.close();
+  }
+});
+
 test("a snapshot of the surface is the newest map, not what was shown before", async () => {
   await view.page.keyboard.press("2");
   await until(

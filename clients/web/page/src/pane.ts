@@ -33,6 +33,8 @@ const KEYS_OF_POINTS = [" ", "ArrowLeft", "ArrowRight"];
 
 const NO_REFERENCE = "No reference: ";
 
+const RELOAD = "A part of the page could not be loaded. Reload it: dtact-web was updated, or is away.";
+
 export class Pane {
   readonly element: HTMLElement;
   private readonly stage = new Stage();
@@ -247,9 +249,10 @@ export class Pane {
     if (view === "difference") void this.fetchReference();
     if (view !== "surface") return;
     if (!this.surface) {
-      const { SurfaceView } = await import("./surface/surface");
+      const part = await import("./surface/surface").catch(() => undefined);
+      if (!part) return this.showNotice(RELOAD);
       if (this.servesPoints) return;
-      this.surface ??= new SurfaceView(this.stage.surfaceHost);
+      this.surface ??= new part.SurfaceView(this.stage.surfaceHost);
     }
     if (this.stage.depth) this.surface.show(this.stage.depth, this.stage.range);
   }
@@ -287,8 +290,9 @@ export class Pane {
     this.surface = undefined;
     this.stage.look("surface");
     if (this.cloud) return;
-    const { CloudView } = await import("./surface/cloud");
-    if (this.servesPoints) this.cloud ??= new CloudView(this.stage.surfaceHost);
+    const part = await import("./surface/cloud").catch(() => undefined);
+    if (!part) return this.showNotice(RELOAD);
+    if (this.servesPoints) this.cloud ??= new part.CloudView(this.stage.surfaceHost);
   }
 
   /** Another daemon may serve maps where one of points was. */
