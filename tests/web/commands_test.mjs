@@ -66,6 +66,33 @@ test("slider, scheme and colour change the simulated light", async () => {
   );
 });
 
+test("the difference waits for the reference of a changed light", async () => {
+  await pane.getByRole("radio", { name: "Difference" }).click();
+  const cover = pane.locator(".veil p");
+  await until(
+    () => cover.textContent(),
+    (text) => text === "",
+  );
+  // All that it says, however short.
+  await cover.evaluate((sentence) => {
+    window.covers = new Set();
+    const add = () => window.covers.add(sentence.textContent);
+    new MutationObserver(add).observe(sentence, { childList: true, characterData: true, subtree: true });
+  });
+  await pane.getByLabel("Brightness").fill("128");
+  await until(
+    () => view.page.evaluate(() => [...window.covers]),
+    (covers) => covers.includes("Waiting for the reference."),
+    20_000,
+  );
+  await until(
+    () => cover.textContent(),
+    (text) => text === "",
+  );
+  await pane.getByLabel("Brightness").fill("255");
+  await pane.getByRole("radio", { name: "Depth" }).click();
+});
+
 test("exposure and gain are changed within the camera's range, and refused beyond in words", async () => {
   const panel = pane.getByLabel("Camera", { exact: true });
   // Shown with the first status.

@@ -259,7 +259,8 @@ export class Pane {
 
   /** The daemon's reference image, in the present light. */
   private async fetchReference(): Promise<void> {
-    if (this.views.value !== "difference") return;
+    // An old one would be taken from pictures in another light.
+    if (this.views.value !== "difference") return void (this.stage.reference = undefined);
     try {
       const result = await this.sensor.request({
         case: "getReference",
@@ -276,8 +277,11 @@ export class Pane {
       const rgba = context?.getImageData(0, 0, width, height).data;
       const values = new Uint8Array(width * height).map((_, i) => rgba?.[4 * i] ?? 0);
       this.stage.reference = { width, height, values };
+      // No frame follows that would show it.
+      if (this.paused) this.sensor.step(0);
       if (this.notice.textContent?.startsWith(NO_REFERENCE)) this.showNotice("");
     } catch (error) {
+      this.stage.reference = undefined;
       this.showNotice(NO_REFERENCE + (error as Error).message);
     }
   }
@@ -376,6 +380,8 @@ export class Pane {
   private status(status: Status): void {
     this.lastStatus = status;
     this.quality.status(status);
+    // One that is made for another light during contact comes without an event.
+    if (!this.stage.reference) void this.fetchReference();
     if (status.light) this.light.show(status.light);
     this.camera.show(status.camera?.settings);
     if (status.reconstruction) this.reconstruction.show(status.reconstruction);
