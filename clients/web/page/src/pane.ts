@@ -468,7 +468,12 @@ export class Pane {
   }
 
   private async snapshot(): Promise<void> {
-    if (!this.frame) return;
-    await saveSnapshot(this.name, this.views.value, this.stage, this.frame, this.lastStatus);
+    const frame = this.stage.frameOfPicture ?? this.frame;
+    if (!frame) return;
+    try {
+      await saveSnapshot(this.name, this.views.value, this.stage, frame, this.lastStatus);
+    } catch (error) {
+      this.showNotice((error as Error).message);
+    }
   }
 }

@@ -10,6 +10,7 @@ export async function saveSnapshot(
   sensor: string,
   view: View,
   stage: Stage,
+  /** The one of the map or picture. */
   frame: Frame,
   status: Status | undefined,
 ): Promise<void> {

@@ -85,6 +85,9 @@ export class Stage {
   private frame: Frame | undefined;
   depth: DepthMap | undefined;
   luma: LumaMap | undefined;
+  /** The frames that these two came with. */
+  private depthFrame: Frame | undefined;
+  private lumaFrame: Frame | undefined;
   /** What the difference is taken from, as large as the camera's picture. */
   reference: LumaMap | undefined;
   private difference: LumaMap | undefined;
@@ -232,8 +235,8 @@ export class Stage {
 
   show(frame: Frame): void {
     this.frame = frame;
-    if (frame.depth) this.depth = frame.depth;
-    if (frame.luma) this.luma = frame.luma;
+    if (frame.depth) [this.depth, this.depthFrame] = [frame.depth, frame];
+    if (frame.luma) [this.luma, this.lumaFrame] = [frame.luma, frame];
     if (this.view === "depth" && frame.depth) this.map.drawDepth(frame.depth);
     if (frame.luma) this.drawPicture();
     this.shape();
@@ -279,6 +282,11 @@ export class Stage {
         "image/png",
       ),
     );
+  }
+
+  /** The frame of what is shown, which newer ones without a map or a picture leave. */
+  get frameOfPicture(): Frame | undefined {
+    return isPicture(this.view) ? this.lumaFrame : this.depthFrame;
   }
 
   private shown(): DepthMap | LumaMap | undefined {
