@@ -3,6 +3,7 @@ import os
 import pathlib
 import struct
 import tempfile
+import tracemalloc
 import unittest
 from unittest import mock
 
@@ -103,6 +104,16 @@ class Read(unittest.TestCase):
             file.write_bytes(MAGIC + CHANNELS + channel(6, "/camera/jpeg") + chunk(inside) + MAGIC)
             frames = list(dtact.read(file))
         self.assertEqual([(f.sequence, f.jpeg) for f in frames], [(2, b"late"), (1, b"early")])
+
+    # Before: what the packed bytes said was allocated, and all records of a chunk stood in memory at once.
+    def test_a_small_file_takes_little_memory(self):
+        large = chunk(bytes(100_000_000), size=1000)
+        empty = chunk(message(3, frame(1).frame) + record(1, b"") * 300_000)
+        tracemalloc.start()
+        self.addCleanup(tracemalloc.stop)
+        with self.assertWarnsRegex(RuntimeWarning, "a chunk has another size than it says"):
+            self.assertEqual(self.read(MAGIC, CHANNELS, large, empty, MAGIC), [1])
+        self.assertLess(tracemalloc.get_traced_memory()[1], 30_000_000)
 
     def test_damage(self):
         good = message(3, frame(1).frame)

@@ -94,9 +94,8 @@ def _records(file: IO[bytes], state: _State) -> Iterator[tuple[int, bytes]]:
         state.end = _CUT
 
 
-def _in_chunk(body: bytes, state: _State) -> list[tuple[int, memoryview]]:
+def _in_chunk(body: bytes, state: _State) -> Iterator[tuple[int, memoryview]]:
     """Its records, of a damaged one those before the damage."""
-    found: list[tuple[int, memoryview]] = []
     try:
         size, name_size = struct.unpack_from("<16xQ4xI", body)
         at = 32 + name_size
@@ -106,6 +105,9 @@ def _in_chunk(body: bytes, state: _State) -> list[tuple[int, memoryview]]:
         if size > _MAX_RECORD:
             raise ValueError(f"a chunk of {size} bytes")
         if compression == "zstd":
+            # What the frame says itself is allocated, whatever max_output_size is.
+            if zstandard.frame_content_size(packed) > size:
+                raise ValueError("a chunk has another size than it says")
             packed = zstandard.ZstdDecompressor().decompress(packed, max_output_size=size)
         elif compression:
             raise ValueError(f"its chunks are compressed with {compression}, not zstd")
@@ -116,12 +118,11 @@ def _in_chunk(body: bytes, state: _State) -> list[tuple[int, memoryview]]:
             opcode, length = struct.unpack_from("<BQ", records)
             if length > len(records) - 9:
                 raise ValueError("a record reaches beyond its chunk")
-            found.append((opcode, records[9 : 9 + length]))
+            yield opcode, records[9 : 9 + length]
             records = records[9 + length :]
     except _DAMAGE as e:
         state.first = state.first or str(e)
         state.chunks += 1
-    return found
 
 
 def _taken(opcode: int, body: bytes | memoryview, state: _State) -> Frame | Event | None:
