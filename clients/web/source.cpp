@@ -189,7 +189,6 @@ void Source::subscribe(const Subscriber& subscriber, v1::Subscribe request, Answ
   const void* const who = subscriber.who;
   if (!connected_) return answered(away());
   const std::uint64_t serial = next_serial_++;
-  newest_[who] = serial;
   if (!wants_frames(request)) {
     for (Stream& stream : streams_) {
       for (Member& member : stream.members) {
@@ -217,6 +216,8 @@ void Source::subscribe(const Subscriber& subscriber, v1::Subscribe request, Answ
     }
     stream = std::prev(streams_.end());
   }
+  // One that was refused leaves those that are still being opened.
+  newest_[who] = serial;
   stream->members.push_back({who, serial, std::move(answered), std::move(frame)});
   if (stream->agreed) settle(*stream, done());
 }

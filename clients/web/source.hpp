@@ -126,9 +126,10 @@ class Source : public std::enable_shared_from_this<Source> {
   std::uint64_t next_id_ = 2;  ///< 1 was Hello's.
   std::map<std::uint64_t, Answered> pending_;
   std::vector<Stream> streams_;
-  std::map<const void*, std::uint64_t> newest_;  ///< The serial of each one's last subscribe().
-  std::uint64_t next_serial_ = 1;                ///< For members and streams.
-  std::vector<std::shared_ptr<Feed>> retired_;   ///< Until their threads have ended.
+  /// The serial of each one's last subscribe() that was not refused.
+  std::map<const void*, std::uint64_t> newest_;
+  std::uint64_t next_serial_ = 1;               ///< For members and streams.
+  std::vector<std::shared_ptr<Feed>> retired_;  ///< Until their threads have ended.
 };
 
 /// A reply that is an error.

@@ -2,11 +2,14 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <boost/asio/executor_work_guard.hpp>
 #include <boost/asio/io_context.hpp>
 #include <chrono>
+#include <future>
 #include <memory>
 #include <string>
+#include <utility>
 
 #include "clients/web/page.hpp"
 #include "clients/web/server.hpp"
@@ -118,6 +121,58 @@ TEST(Source, SubscriptionsThatAreBeingOpenedCount) {
   EXPECT_EQ(answer.error().code(), v1::ERROR_BUSY);
   EXPECT_TRUE(answer.error().message().starts_with("test has 5 different subscriptions to left"))
       << answer.error().message();
+}
+
+// Before: its viewer got the answer Done, and no frame.
+TEST(Source, ARefusedSubscriptionLeavesOneThatIsBeingOpened) {
+  base::UniqueFd listening = client::test::listen_on();
+  const int fd = listening.get();
+  std::promise<void> asked;
+  std::promise<void> refused;
+  PlayedDaemon daemon({[&](Peer& peer) {
+                        peer.greet();
+                        Peer feed(fd, nullptr);
+                        feed.greet();
+                        v1::ServerMessage agreed;
+                        agreed.mutable_reply()->set_id(feed.request().id());
+                        agreed.mutable_reply()->mutable_done();
+                        asked.set_value();
+                        refused.get_future().wait();
+                        feed.send(agreed);
+                        feed.frame(41);
+                        (void)peer.ends_silently();
+                      }},
+                      std::move(listening));
+  boost::asio::io_context io;
+  const auto source = std::make_shared<Source>(io, "left", daemon.options);
+  source->start();
+  run_until(io, [&] { return source->connected(); });
+  v1::Reply answer;
+  std::size_t frames = 0;
+  const auto subscribe = [&](const void* who, double hz) {
+    v1::Subscribe request;
+    request.set_summary(true);
+    request.set_summary_hz(hz);
+    answer = {};
+    source->subscribe(
+        {.who = who, .owner = "test", .may_control = true}, request,
+        [&](const v1::Reply& reply) { answer = reply; },
+        [&](const RelayedFrame&, std::uint64_t) { ++frames; });
+  };
+  std::array<char, Source::kMaxFeedsOfOne> viewers{};
+  subscribe(&viewers.front(), 1);
+  asked.get_future().wait();
+  for (std::size_t i = 1; i < viewers.size(); ++i) {
+    subscribe(&viewers[i], 1 + static_cast<double>(i));
+  }
+  EXPECT_FALSE(answer.has_error());
+  subscribe(&viewers.front(), 100);
+  EXPECT_EQ(answer.error().code(), v1::ERROR_BUSY);
+  refused.set_value();
+  run_until(io, [&] { return frames > 0; });
+  EXPECT_TRUE(answer.has_done());
+  EXPECT_EQ(frames, 1U);
+  source->stop();
 }
 
 // Before: the exception ended the program, which found the same daemons again.
