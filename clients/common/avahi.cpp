@@ -321,7 +321,8 @@ std::vector<Finder::Found> Finder::add(const std::vector<FoundDaemon>& all) {
       if (!known->second.name.empty()) changed.push_back(make(known->second.name, one));
       continue;
     }
-    if (known_.size() == max_found_) break;
+    // Known ones may stand behind it, at another address by now.
+    if (known_.size() == max_found_) continue;
     if (!named) named = instances(named_);
     Known& fresh = known_[place];
     fresh.address = one.address();

@@ -128,6 +128,17 @@ TEST(Finder, FollowsADaemonToAnotherAddress) {
   EXPECT_TRUE(finder.add({other}).empty());
 }
 
+// Before: others whose names stood before its own kept it at an address that it had left.
+TEST(Finder, FollowsWhatItKnowsWhateverElseIsAnnounced) {
+  cli::Finder finder({}, {}, 1);
+  auto known = found("left", "b.local", 7377);
+  ASSERT_EQ(finder.add({known}).size(), 1U);
+  known.set_address("192.0.2.8");
+  const auto moved = finder.add({found("another", "a.local", 7377), known});
+  ASSERT_EQ(moved.size(), 1U);
+  EXPECT_EQ(moved[0].daemon.options.host, "192.0.2.8");
+}
+
 TEST(Finder, LeavesOutThoseThatWereNamed) {
   net::NetConfig config;
   config.instance = "f00d";
