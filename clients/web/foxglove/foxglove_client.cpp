@@ -68,6 +68,11 @@ void FoxgloveClient::advertise_channels() {
   const auto any = [](const Channels& of) { return of.topics.any(); };
   if (std::ranges::any_of(gone, any)) send(unadvertise(gone));
   if (std::ranges::any_of(come, any)) send(advertise(come));
+  // To the protocol they end with their channel. The daemon would refuse what they ask for.
+  const auto ended = std::erase_if(subscriptions_, [this](const auto& entry) {
+    return !mounts_[entry.second.place].reported.test(index(entry.second.topic));
+  });
+  if (ended > 0) update_want();
 }
 
 void FoxgloveClient::close(const std::string& reason) {

@@ -1,16 +1,22 @@
 // Messages to a client of the Foxglove protocol while its link is slow.
 #include "clients/web/foxglove/foxglove_client.hpp"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <boost/asio/buffer.hpp>
 #include <boost/asio/buffers_iterator.hpp>
+#include <boost/asio/executor_work_guard.hpp>
 #include <boost/asio/io_context.hpp>
+#include <chrono>
+#include <future>
 #include <memory>
 #include <string>
 #include <utility>
 #include <vector>
+
+#include "tests/unit/client/played_daemon.hpp"
 
 namespace dtact::web::foxglove {
 namespace {
@@ -103,6 +109,52 @@ TEST(FoxgloveClient, WithdrawsItsAlertWhenTheDaemonIsBack) {
   }
   EXPECT_EQ(socket->sent.back(), R"({"op":"removeStatus","statusIds":["left"]})");
   client->close("over");
+}
+
+// Before: with depth of a dtact-perceive all of the client's subscriptions were refused.
+TEST(FoxgloveClient, SubscriptionsEndWithTheirChannels) {
+  base::UniqueFd listening = client::test::listen_on();
+  const int fd = listening.get();
+  std::promise<v1::Subscribe> asked;
+  client::test::PlayedDaemon daemon({[&](client::test::Peer& peer) {
+                                      peer.greet({"cloud"});
+                                      client::test::Peer feed(fd, nullptr);
+                                      feed.greet({"cloud"});
+                                      asked.set_value(feed.request().subscribe());
+                                      (void)peer.ends_silently();
+                                    }},
+                                    std::move(listening));
+  asio::io_context io;
+  const auto source = std::make_shared<Source>(io, "left", daemon.options);
+  const auto sensor = std::make_shared<SensorTopics>(source);
+  const auto socket = std::make_shared<SlowSocket>(io);
+  const auto client = std::make_shared<FoxgloveClient>(socket, std::vector<Mount>{{sensor, "", {}}},
+                                                       net::Tokens::Grant{}, "viewer", "test",
+                                                       [](const std::string&) {});
+  sensor->start();
+  client->start();
+  // Whatever serves there, it is taken for a dtactd until it has answered.
+  for (const auto& [id, topic] : {std::pair(7, Topic::depth), std::pair(8, Topic::contact)}) {
+    while (socket->finish_write()) {
+    }
+    socket->receive(
+        fmt::format(R"({{"op":"subscribe","subscriptions":[{{"id":{},"channelId":{}}}]}})", id,
+                    index(topic) + 1));
+  }
+  source->start();
+  std::future<v1::Subscribe> subscription = asked.get_future();
+  const auto work = asio::make_work_guard(io);
+  const auto end = std::chrono::steady_clock::now() + client::test::kLong;
+  while (subscription.wait_for(std::chrono::seconds(0)) != std::future_status::ready &&
+         std::chrono::steady_clock::now() < end) {
+    io.run_for(std::chrono::milliseconds(10));
+  }
+  const v1::Subscribe wanted = subscription.get();
+  EXPECT_EQ(wanted.depth(), v1::DEPTH_NONE);
+  EXPECT_TRUE(wanted.summary());
+  client->close("over");
+  sensor->stop();
+  source->stop();
 }
 
 // Before: 40 clients that did not read had 620 MB of such answers.
