@@ -40,8 +40,7 @@ class Sensor : public net::SessionHost, public std::enable_shared_from_this<Sens
       std::chrono::steady_clock::time_point now = std::chrono::steady_clock::now()) const;
   /// Asks the daemon for its status, at most once a second however many viewers there are.
   void ask_status();
-  [[nodiscard]] Source& source() const noexcept { return *source_; }
-  [[nodiscard]] const std::shared_ptr<Source>& shared_source() const noexcept { return source_; }
+  [[nodiscard]] const std::shared_ptr<Source>& source() const noexcept { return source_; }
 
   void introduce(v1::HelloReply& reply) const override;
   void on_authenticated() override {}

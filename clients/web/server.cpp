@@ -86,7 +86,7 @@ Server::Server(asio::io_context& io, Settings settings, const Page& page)
 void Server::start() {
   for (const auto& sensor : sensors_) {
     sensor->start();
-    sensor->source().start();
+    sensor->source()->start();
   }
   foxglove_->start();
   listener_->start();
@@ -96,11 +96,11 @@ void Server::start() {
 void Server::add(const cli::Finder::Found& found) {
   const cli::NamedDaemon& daemon = found.daemon;
   const auto known = std::ranges::find_if(
-      sensors_, [&](const auto& one) { return one->source().name() == daemon.name; });
+      sensors_, [&](const auto& one) { return one->source()->name() == daemon.name; });
   if (known != sensors_.end()) {
     config_.log({net::LogLevel::info, fmt::format("{} is at {}:{} now", daemon.name,
                                                   daemon.options.host, daemon.options.port)});
-    return (*known)->source().use(daemon.options);
+    return (*known)->source()->use(daemon.options);
   }
   config_.log({net::LogLevel::info, found.refused.empty()
                                         ? fmt::format("found {} at {}:{}", daemon.name,
@@ -140,7 +140,7 @@ void Server::stop() {
   guided_->stop();
   for (const auto& sensor : sensors_) {
     sensor->stop();
-    sensor->source().stop();
+    sensor->source()->stop();
   }
 }
 
@@ -229,7 +229,7 @@ Answer Server::fleet(const Request& request, const net::Peer& peer) {
 std::vector<std::shared_ptr<Source>> Server::sources() const {
   std::vector<std::shared_ptr<Source>> all;
   all.reserve(sensors_.size());
-  for (const auto& sensor : sensors_) all.push_back(sensor->shared_source());
+  for (const auto& sensor : sensors_) all.push_back(sensor->source());
   return all;
 }
 
@@ -240,8 +240,8 @@ std::shared_ptr<Sensor> Server::find(std::string_view path) const {
   if (!path.starts_with(kBefore) || !path.ends_with(kBehind)) return nullptr;
   path.remove_prefix(kBefore.size());
   path.remove_suffix(std::min(path.size(), kBehind.size()));
-  const auto found =
-      std::ranges::find_if(sensors_, [&](const auto& one) { return one->source().name() == path; });
+  const auto found = std::ranges::find_if(
+      sensors_, [&](const auto& one) { return one->source()->name() == path; });
   return found == sensors_.end() ? nullptr : *found;
 }
 

@@ -131,7 +131,7 @@ void SensorTopics::clear_points(const v1::Frame& frame) {
     points_shown_ = true;
   } else if (points_shown_ && frame.has_contact() && !frame.contact().in_contact()) {
     points_shown_ = false;
-    publish(Topic::points, no_points(frame));
+    publish(Topic::points, points_of(frame));
   }
 }
 

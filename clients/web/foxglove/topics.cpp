@@ -8,11 +8,13 @@
 namespace dtact::web::foxglove {
 namespace {
 
+std::uint64_t time_of(const v1::Frame& frame) {
+  return static_cast<std::uint64_t>(std::max<std::int64_t>(0, frame.wall_ns()));
+}
+
 std::shared_ptr<const Message> made(const v1::Frame& frame,
                                     const google::protobuf::Message& message) {
-  return std::make_shared<const Message>(
-      Message{static_cast<std::uint64_t>(std::max<std::int64_t>(0, frame.wall_ns())),
-              message.SerializeAsString()});
+  return std::make_shared<const Message>(Message{time_of(frame), message.SerializeAsString()});
 }
 
 /// Like in a recording: images have channels of their own.
@@ -26,6 +28,10 @@ std::shared_ptr<const Message> without_pictures(const v1::Frame& frame, bool dep
 }
 
 }  // namespace
+
+std::shared_ptr<const Message> points_of(const v1::Frame& frame) {
+  return made(frame, recording::point_cloud(frame, time_of(frame)));
+}
 
 const std::array<TopicInfo, kTopics>& topics() {
   static const std::array<TopicInfo, kTopics> all{{
@@ -103,7 +109,7 @@ v1::Subscribe subscription_for(Topics wanted) {
 }
 
 std::shared_ptr<const Message> message_of(Topic topic, const v1::Frame& frame) {
-  const auto time_ns = static_cast<std::uint64_t>(std::max<std::int64_t>(0, frame.wall_ns()));
+  const auto time_ns = time_of(frame);
   switch (topic) {
     case Topic::frame:
       return without_pictures(frame, true);
@@ -118,7 +124,7 @@ std::shared_ptr<const Message> message_of(Topic topic, const v1::Frame& frame) {
     case Topic::jpeg:
       return frame.has_jpeg() ? made(frame, recording::jpeg_picture(frame, time_ns)) : nullptr;
     case Topic::points:
-      return frame.has_cloud() ? made(frame, recording::point_cloud(frame, time_ns)) : nullptr;
+      return frame.has_cloud() ? points_of(frame) : nullptr;
     case Topic::pose:
       return frame.pose().valid() ? made(frame, recording::pose_in_frame(frame, time_ns)) : nullptr;
     case Topic::recognition:
@@ -131,15 +137,6 @@ std::shared_ptr<const Message> message_of(Topic topic, const v1::Frame& frame) {
       return nullptr;
   }
   return nullptr;
-}
-
-std::shared_ptr<const Message> no_points(const v1::Frame& frame) {
-  v1::Frame plain;
-  plain.set_wall_ns(frame.wall_ns());
-  plain.set_frame_id(frame.frame_id());
-  return made(plain,
-              recording::point_cloud(
-                  plain, static_cast<std::uint64_t>(std::max<std::int64_t>(0, frame.wall_ns()))));
 }
 
 }  // namespace dtact::web::foxglove

@@ -62,7 +62,7 @@ struct Message {
 /// `frame` as a topic's message; null when it has nothing of that. Light and events are none of a
 /// frame's own. Throws client::ProtocolError for a damaged map.
 [[nodiscard]] std::shared_ptr<const Message> message_of(Topic topic, const v1::Frame& frame);
-/// A cloud without points: viewers show the last one until the next.
-[[nodiscard]] std::shared_ptr<const Message> no_points(const v1::Frame& frame);
+/// The frame's points: none of one that has none, as viewers show the last ones until the next.
+[[nodiscard]] std::shared_ptr<const Message> points_of(const v1::Frame& frame);
 
 }  // namespace dtact::web::foxglove

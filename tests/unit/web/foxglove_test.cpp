@@ -185,7 +185,7 @@ TEST(FoxgloveTopics, NoPointsAreACloudToo) {
   frame.set_frame_id("dtact_surface");
   EXPECT_EQ(message_of(Topic::points, frame), nullptr);
   ::foxglove::PointCloud points;
-  ASSERT_TRUE(points.ParseFromString(no_points(frame)->payload));
+  ASSERT_TRUE(points.ParseFromString(points_of(frame)->payload));
   EXPECT_EQ(points.frame_id(), "dtact_surface");
   EXPECT_EQ(points.timestamp().nanos(), 2);
   EXPECT_EQ(points.point_stride(), 24U);
