@@ -161,8 +161,18 @@ void PointWriter::write(dds_entity_t writer, const Header& header, const v1::Fra
   const perceive::DepthGrid grid = cli::grid_of(map, depths);
   const double min_mm = frame.contact().threshold_mm();
   if (!all && !frame.contact().in_contact()) return write_none(writer, header);
+  const auto millimetres = [&](std::int16_t depth) { return 1e-3 * map.um_per_unit() * depth; };
+  const auto points = std::ranges::count_if(depths, [&](std::int16_t depth) {
+    return depth != map.untrusted_value() && (all || millimetres(depth) >= min_mm);
+  });
+  // A cloud is made as a whole for any stride: not those that would be too large anyway.
+  int stride = 1;
+  while (static_cast<std::size_t>(points) * kPointBytes >
+         kMaxCloud * static_cast<std::size_t>(stride) * static_cast<std::size_t>(stride)) {
+    stride *= 2;
+  }
   std::vector<float> values;
-  for (int stride = 1;; stride *= 2) {
+  for (;; stride *= 2) {
     values.clear();
     maker_.make(grid, stride, cloud_);
     for (std::size_t i = 0; i < cloud_.size(); ++i) {
@@ -175,7 +185,7 @@ void PointWriter::write(dds_entity_t writer, const Header& header, const v1::Fra
           grid.y;
       const auto at = static_cast<std::size_t>(row) * static_cast<std::size_t>(grid.width) +
                       static_cast<std::size_t>(column);
-      const double mm = 1e-3 * map.um_per_unit() * depths[at];
+      const double mm = millimetres(depths[at]);
       if (!all && mm < min_mm) continue;
       for (std::size_t part = 0; part < perceive::PointCloud::kParts; ++part) {
         values.push_back(cloud_.values[part * cloud_.size() + i]);
