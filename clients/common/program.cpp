@@ -5,10 +5,12 @@
 #include <algorithm>
 #include <cctype>
 #include <ostream>
+#include <sstream>
 #include <string_view>
 #include <utility>
 
 #include "clients/common/exit_codes.hpp"
+#include "hal/base/utf8.hpp"
 #include "version.hpp"
 
 namespace dtact::cli {
@@ -142,7 +144,10 @@ CLI::Option* add_json_option(CLI::App& command, Context& context) {
 int run(CLI::App& app, std::vector<std::string> arguments, std::ostream& out, std::ostream& error) {
   const auto fail = [&](const std::exception& e, ExitCode code) {
     out.flush();
-    error << app.get_name() << ": " << e.what() << '\n';
+    error << app.get_name() << ": ";
+    // A daemon's answer may be among them.
+    std::istringstream lines(e.what());
+    for (std::string line; std::getline(lines, line);) error << base::printable(line) << '\n';
     return code;
   };
   try {

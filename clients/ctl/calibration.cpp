@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "clients/common/json.hpp"
+#include "clients/common/printable.hpp"
 #include "clients/common/reports.pb.h"
 #include "clients/ctl/calibration_text.hpp"
 #include "clients/ctl/online.hpp"
@@ -87,10 +88,13 @@ std::string difference_of(const std::vector<v1::StoredCalibration>& calibrations
 
 void list(const Context& context) {
   client::Client client(context.target);
-  const auto calibrations = client.calibrations();
+  auto calibrations = client.calibrations();
   if (context.json) {
     for (const auto& stored : calibrations) context.out << cli::json_line(stored);
-  } else if (calibrations.empty()) {
+    return;
+  }
+  for (auto& stored : calibrations) cli::make_printable(stored);
+  if (calibrations.empty()) {
     context.out << "the daemon keeps no calibration: dtactctl calibration upload sends one\n"
                 << difference_of(calibrations, client);
   } else {

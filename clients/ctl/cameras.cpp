@@ -12,6 +12,7 @@
 
 #include "clients/common/json.hpp"
 #include "clients/common/reports.pb.h"
+#include "hal/base/utf8.hpp"
 
 namespace dtact::ctl {
 namespace {
@@ -22,6 +23,17 @@ using hal::v4l2::SurveyedCamera;
 
 /// Drivers' rates are fractions; 60.00024 is shown as 60.
 double rounded(double fps) { return std::round(fps * 100) / 100; }
+
+/// Without control characters in what the camera says of itself, which a terminal would obey.
+SurveyedCamera printable(SurveyedCamera camera) {
+  hal::v4l2::Attached& who = camera.attached;
+  for (std::string* text : {&who.node, &who.by_path, &who.by_id, &who.serial, &who.bus, &who.card,
+                            &who.driver, &who.problem, &who.not_taken}) {
+    *text = base::printable(*text);
+  }
+  for (OfferedControl& control : camera.controls) control.name = base::printable(control.name);
+  return camera;
+}
 
 void print_text(const SurveyedCamera& camera, std::ostream& out) {
   const hal::v4l2::Attached& who = camera.attached;
@@ -107,9 +119,9 @@ void print_cameras(const std::vector<SurveyedCamera>& cameras, bool json, bool t
   const auto rest = std::ranges::find_if(
       cameras, [](const SurveyedCamera& c) { return !c.attached.not_taken.empty(); });
   if (rest == cameras.begin()) out << "no camera is attached\n";
-  for (auto it = cameras.begin(); it != rest; ++it) print_text(*it, out);
+  for (auto it = cameras.begin(); it != rest; ++it) print_text(printable(*it), out);
   if (rest != cameras.end()) out << "not taken\n";
-  for (auto it = rest; it != cameras.end(); ++it) print_not_taken(*it, terminal, out);
+  for (auto it = rest; it != cameras.end(); ++it) print_not_taken(printable(*it), terminal, out);
 }
 
 void add_cameras(CLI::App& app, Context& context) {

@@ -16,6 +16,7 @@
 #include "clients/common/daemon_option.hpp"
 #include "clients/common/exit_codes.hpp"
 #include "clients/common/json.hpp"
+#include "clients/common/printable.hpp"
 #include "clients/cpp/names.hpp"
 #include "clients/ctl/online.hpp"
 
@@ -124,8 +125,10 @@ void report(const Context& context, const Reports& reports, const Columns& colum
   if (context.json) {
     for (const auto& one : reports) context.out << cli::json_line(one);
   } else {
-    print_table(reports, columns, context.out);
-    for (const auto& one : reports) {
+    Reports printable = reports;
+    for (auto& one : printable) cli::make_printable(one);
+    print_table(printable, columns, context.out);
+    for (const auto& one : printable) {
       if (!one.status().advice().empty()) {
         context.out << fmt::format("\n{}: {}\n", one.name(), one.status().advice());
       }

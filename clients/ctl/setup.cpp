@@ -26,6 +26,7 @@
 #include "clients/ctl/online.hpp"
 #include "clients/ctl/setup_plan.hpp"
 #include "hal/base/atomic_file.hpp"
+#include "hal/base/utf8.hpp"
 #include "hal/files/key_reader.hpp"
 
 namespace dtact::ctl {
@@ -206,7 +207,8 @@ class Setup {
                        hal::v4l2::describe(camera.modes)));
     }
     context_.out << fmt::format("camera: {} ({}), {}; --mode takes another of {}\n",
-                                camera.attached.stable_name(), camera.attached.card, text_of(*best),
+                                base::printable(camera.attached.stable_name()),
+                                base::printable(camera.attached.card), text_of(*best),
                                 hal::v4l2::describe(camera.modes));
     assign(wanted, "camera.backend", "\"v4l2\"");
     assign(wanted, "camera.width", std::to_string(best->width));
@@ -221,8 +223,9 @@ class Setup {
   [[nodiscard]] std::size_t choose(const std::vector<hal::v4l2::SurveyedCamera>& cameras) const {
     if (cameras.size() == 1) return 0;
     for (std::size_t i = 0; i < cameras.size(); ++i) {
-      context_.out << fmt::format("  {}  {} ({})\n", i + 1, cameras[i].attached.stable_name(),
-                                  cameras[i].attached.card);
+      context_.out << fmt::format("  {}  {} ({})\n", i + 1,
+                                  base::printable(cameras[i].attached.stable_name()),
+                                  base::printable(cameras[i].attached.card));
     }
     const std::string typed = ask("Which camera looks at the gel? Its number: ");
     for (std::size_t i = 0; i < cameras.size(); ++i) {

@@ -5,6 +5,7 @@
 #include <ostream>
 
 #include "clients/common/json.hpp"
+#include "clients/common/printable.hpp"
 #include "clients/cpp/names.hpp"
 #include "clients/ctl/calibration_text.hpp"
 #include "clients/ctl/light_text.hpp"
@@ -130,7 +131,7 @@ void add_status(CLI::App& app, Context& context) {
     if (context.json) {
       context.out << cli::json_line(status);
     } else {
-      print(status, context.out);
+      print(cli::printable(status), context.out);
     }
   });
 }

@@ -23,6 +23,7 @@
 #include "clients/dds/recorder.hpp"
 #include "clients/dds/ros2.h"
 #include "clients/dds/sensor.hpp"
+#include "hal/base/utf8.hpp"
 #include "proto/defaults.hpp"
 
 namespace dtact::dds {
@@ -206,7 +207,7 @@ class Program {
   /// A line each, for a terminal and for the journal alike.
   void log(const std::string& line) {
     const std::lock_guard lock(mutex_);
-    out_ << line << '\n' << std::flush;
+    out_ << base::printable(line) << '\n' << std::flush;
   }
 
   std::ostream& out_;

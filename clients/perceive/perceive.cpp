@@ -14,6 +14,7 @@
 #include "clients/perceive/server.hpp"
 #include "clients/perceive/watch.hpp"
 #include "daemon/serve/net_config.hpp"
+#include "hal/base/utf8.hpp"
 #include "version.hpp"
 
 namespace dtact::perceive {
@@ -34,7 +35,7 @@ void serve(const cli::Context& context, const Settings& settings) {
   config.anonymous_rights = net::Rights::view;  // it takes no command
   // A line each, for a terminal and for the journal alike.
   config.log = [&out = context.out](const net::LogLine& line) {
-    out << line.text << '\n' << std::flush;
+    out << base::printable(line.text) << '\n' << std::flush;
   };
   std::shared_ptr<const ObjectModel> object;
   if (!settings.object.empty()) {

@@ -17,6 +17,7 @@
 #include "clients/web/page.hpp"
 #include "clients/web/server.hpp"
 #include "daemon/serve/security.hpp"
+#include "hal/base/utf8.hpp"
 #include "version.hpp"
 
 namespace dtact::web {
@@ -44,7 +45,7 @@ void serve(const cli::Context& context, const Arguments& arguments) {
       net::reaches_beyond(config) ? net::Rights::view : net::Rights::calibrate);
   // A line each, for a terminal and for the journal alike.
   config.log = [&out = context.out](const net::LogLine& line) {
-    out << line.text << '\n' << std::flush;
+    out << base::printable(line.text) << '\n' << std::flush;
   };
   const auto page =
       arguments.page.empty() ? std::make_unique<Page>() : std::make_unique<Page>(arguments.page);

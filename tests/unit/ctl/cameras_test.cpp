@@ -35,6 +35,19 @@ std::string printed(const std::vector<hal::v4l2::SurveyedCamera>& cameras, bool 
   return out.str();
 }
 
+// A USB device may call itself anything.
+TEST(Cameras, GiveATerminalNoCommands) {
+  hal::v4l2::SurveyedCamera hostile = camera();
+  hostile.attached.card = "Fin\x1b]0;ger";
+  hostile.attached.serial = "\x1b[2J";
+  hostile.controls[0].name = "gain\x07";
+  const std::string text = printed({hostile}, false);
+  EXPECT_NE(text.find("Fin?]0;ger (uvcvideo)"), std::string::npos) << text;
+  EXPECT_NE(text.find("serial:?[2J"), std::string::npos) << text;
+  EXPECT_NE(text.find("gain? "), std::string::npos) << text;
+  EXPECT_EQ(text.find('\x1b'), std::string::npos);
+}
+
 TEST(Cameras, AreListedWithNamesModesAndControls) {
   EXPECT_EQ(printed({camera()}, false),
             "/dev/v4l/by-path/usb-0:1-video-index0\n"

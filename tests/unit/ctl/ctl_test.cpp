@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <string>
 
+#include "tests/unit/client/played_daemon.hpp"
 #include "tests/unit/ctl/run_ctl.hpp"
 #include "tests/unit/net/rig.hpp"
 
@@ -172,6 +173,27 @@ TEST(Rezero, IsRefusedUnlessForced) {
   EXPECT_EQ(refused.code, 1);
   EXPECT_EQ(refused.error, "dtactctl: there is contact\n");
   EXPECT_EQ(ctl(rig, {"rezero", "--force"}).code, 0);
+}
+
+// A daemon may call itself, its camera and its clients anything, and answer anything.
+TEST(Terminal, GetsNoCommandsOfADaemon) {
+  v1::Reply status;
+  status.mutable_status()->mutable_camera()->set_identity("Fin\x1b]0;ger");
+  status.mutable_status()->add_realtime_refused("no\x1b[2Jne");
+  status.mutable_status()->set_version("9\xc2\x9b\x38");
+  client::test::PlayedDaemon daemon({[&](client::test::Peer& peer) {
+                                       peer.greet();
+                                       peer.answer(status);
+                                     },
+                                     [](client::test::Peer& peer) {
+                                       peer.greet();
+                                       peer.refuse(v1::ERROR_DENIED, "not\x1b[31m you");
+                                     }});
+  const std::string port = std::to_string(daemon.options.port);
+  const auto shown = ctl({"--port", port, "status"});
+  EXPECT_THAT(shown.out, AllOf(HasSubstr("Fin?]0;ger"), HasSubstr("no?[2Jne"), HasSubstr("9?8")));
+  EXPECT_THAT(shown.out, Not(HasSubstr("\x1b")));
+  EXPECT_EQ(ctl({"--port", port, "rezero"}).error, "dtactctl: not?[31m you\n");
 }
 
 }  // namespace

@@ -64,7 +64,7 @@ ROOMS = {
     "clients/web/foxglove": ["hal/base", "proto", "daemon/serve", "clients/cpp", "clients/common", "clients/recording", "clients/web"],
     "clients/web": ["hal/base", "proto", "daemon/serve", "clients/common", "clients/cpp", "clients/web/foxglove"],
     # Converts frames and passes commands on.
-    "clients/dds": ["hal/files", "daemon/serve", "daemon/recon", "proto", "clients/common", "clients/cpp", "clients/geometry", "clients/recording"],
+    "clients/dds": ["hal/base", "hal/files", "daemon/serve", "daemon/recon", "proto", "clients/common", "clients/cpp", "clients/geometry", "clients/recording"],
     # Administers a daemon: neither a fit nor OpenCV.
     "clients/ctl": ["hal/base", "hal/files", "hal/v4l2", "proto", "clients/common", "clients/cpp", "clients/recording"],
 }
