@@ -1,4 +1,5 @@
 // dtactctl setup: from a plugged-in camera to depth, by the programs that do each step.
+#include <fcntl.h>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <spawn.h>
@@ -11,21 +12,26 @@
 #include <cerrno>
 #include <chrono>
 #include <cstdint>
+#include <cstdlib>
 #include <cstring>
 #include <filesystem>
 #include <iostream>
 #include <memory>
 #include <string>
+#include <system_error>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "clients/common/exit_codes.hpp"
 #include "clients/common/interruptible.hpp"
+#include "clients/common/printable.hpp"
 #include "clients/common/sibling_program.hpp"
 #include "clients/cpp/client.hpp"
 #include "clients/ctl/online.hpp"
 #include "clients/ctl/setup_plan.hpp"
 #include "hal/base/atomic_file.hpp"
+#include "hal/base/unique_fd.hpp"
 #include "hal/base/utf8.hpp"
 #include "hal/files/key_reader.hpp"
 
@@ -51,6 +57,27 @@ struct SetupOptions {
   std::string ruler;
   std::string lens;
   std::string crop;
+};
+
+/// A file beside another, which is removed at the end.
+class TrialFile {
+ public:
+  /// Throws std::system_error.
+  explicit TrialFile(const std::string& beside) : path_(beside + ".XXXXXX") {
+    const base::UniqueFd fd(::mkostemp(path_.data(), O_CLOEXEC));
+    if (!fd) throw std::system_error(errno, std::generic_category(), path_);
+  }
+  ~TrialFile() {
+    std::error_code ignored;
+    fs::remove(path_, ignored);
+  }
+  TrialFile(const TrialFile&) = delete;
+  TrialFile& operator=(const TrialFile&) = delete;
+
+  [[nodiscard]] const std::string& path() const { return path_; }
+
+ private:
+  std::string path_;
 };
 
 /// Runs a program on this terminal. Returns its exit status. Throws when it is not there.
@@ -263,13 +290,12 @@ class Setup {
       stop(fmt::format("cannot write {} ({}): run it by sudo", options_.config,
                        std::strerror(errno)));
     }
-    const std::string trial = options_.config + ".new";
-    base::write_file_atomically(trial, after, about.st_mode & 0777U);
-    const int status =
-        run_program({cli::sibling("dtactd"), "--config", trial, "--check-config"}, context_.out);
-    std::error_code ignored;
-    fs::remove(trial, ignored);
-    if (status != 0) stop("dtactd refuses these settings, nothing is written: see above");
+    const TrialFile trial(options_.config);
+    base::write_file_atomically(trial.path(), after, about.st_mode & 0777U);
+    if (run_program({cli::sibling("dtactd"), "--config", trial.path(), "--check-config"},
+                    context_.out) != 0) {
+      stop("dtactd refuses these settings, nothing is written: see above");
+    }
     base::write_file_atomically(options_.config, after, about.st_mode & 0777U);
     // The daemon's group reads it.
     if (::chown(options_.config.c_str(), about.st_uid, about.st_gid) != 0) {
@@ -308,7 +334,7 @@ class Setup {
       try {
         v1::Status status = client::Client(target_).status();
         if (status.camera().delivered() > 0 && status.state() != v1::STATE_CAMERA_LOST) {
-          return status;
+          return cli::printable(std::move(status));
         }
         why = status.advice();
       } catch (const client::IdentityError&) {

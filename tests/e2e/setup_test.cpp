@@ -136,11 +136,19 @@ TEST_F(Setup, StopsWithWhatToDoAndHowToGoOn) {
                              HasSubstr("then continue with: dtactctl setup --config "),
                              HasSubstr(" --camera serial:none"),
                              HasSubstr(" camera check restart calibrate watch")));
+  // A file of the administrator's own.
+  std::ofstream(file("dtactd.toml.new")) << "mine";
   std::ofstream(file("board.toml")) << "[camera]\nbackend = \"libcamera\"\nwidth = 1\n";
   EXPECT_EQ(setup({"camera", "--board", file("board.toml").string()}), kNotMet);
   EXPECT_THAT(output_, AllOf(HasSubstr("camera.width"), HasSubstr("nothing is written")));
   EXPECT_EQ(base::read_file(config()), before);
-  EXPECT_FALSE(fs::exists(file("dtactd.toml.new")));
+  EXPECT_EQ(base::read_file(file("dtactd.toml.new")), "mine");
+  EXPECT_EQ(
+      std::ranges::count_if(fs::directory_iterator(config().parent_path()),
+                            [](const fs::directory_entry& entry) {
+                              return entry.path().filename().string().starts_with("dtactd.toml.");
+                            }),
+      1);
   EXPECT_EQ(setup({"restart", "--unit", "dtactd@none"}), kNotMet);
   EXPECT_THAT(output_, HasSubstr("the service does not start: systemctl status dtactd@none"));
   EXPECT_EQ(setup({"calibrate"}), kNotMet);
