@@ -73,7 +73,8 @@ Server::Server(asio::io_context& io, Settings settings, const Page& page)
     auto source = std::make_shared<Source>(io, daemon.name, std::move(daemon.options));
     sensors_.push_back(std::make_shared<Sensor>(io, std::move(source), config_, admission_));
   }
-  foxglove_ = std::make_unique<foxglove::FoxgloveEndpoint>(sources(), config_, admission_);
+  foxglove_ =
+      std::make_unique<foxglove::FoxgloveEndpoint>(sources(), settings.find, config_, admission_);
   guided_ = std::make_unique<guided::GuidedEndpoint>(
       sources(), std::move(settings.work_folder), std::move(settings.taught), config_, admission_);
   listener_ = net::listen_tcp(io, config_, [this](asio::ip::tcp::socket socket, net::Peer peer) {

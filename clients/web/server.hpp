@@ -25,6 +25,7 @@ namespace dtact::web {
 struct Settings {
   net::NetConfig net;
   std::vector<cli::NamedDaemon> daemons;
+  bool find = false;  ///< Others come by Server::add().
   /// By which browsers may name this machine, besides its addresses.
   std::vector<std::string> host_names;
   /// Origins that may open Foxglove's WebSocket besides our own and those of programs on the

@@ -27,7 +27,6 @@ namespace {
 struct Arguments {
   Settings settings;
   std::vector<std::string> daemons;
-  bool find = false;
   std::filesystem::path page;
   std::optional<net::Rights> anonymous_rights;
 };
@@ -35,7 +34,7 @@ struct Arguments {
 void serve(const cli::Context& context, const Arguments& arguments) {
   Settings settings = arguments.settings;
   settings.daemons = cli::parse_daemons("--daemon", arguments.daemons, context.target);
-  if (settings.daemons.empty() && !arguments.find) settings.daemons = {{"sensor", context.target}};
+  if (settings.daemons.empty() && !settings.find) settings.daemons = {{"sensor", context.target}};
   if (settings.taught.empty()) settings.taught = settings.work_folder / "objects";
   for (std::string& name : machine_names()) settings.host_names.push_back(std::move(name));
   net::NetConfig& config = settings.net;
@@ -63,7 +62,7 @@ void serve(const cli::Context& context, const Arguments& arguments) {
   cli::reload_at_hangup(hangups, config.log, [&] { server->reload(); });
   server->start();
   std::jthread finder;
-  if (arguments.find) {
+  if (settings.find) {
     finder = cli::watch_network(
         context.target, settings.daemons,
         [&](cli::Finder::Found found) {
@@ -93,7 +92,7 @@ void set_up(CLI::App& app, cli::Context& context) {
   net.max_clients_per_address = 48;
   arguments->settings.work_folder = "dtact-calibrations";
   cli::add_daemon_option(app, arguments->daemons, "on the page");
-  cli::add_find_option(app, arguments->find);
+  cli::add_find_option(app, arguments->settings.find);
   cli::add_listen_options(app, net);
   CLI::CheckedTransformer rights(
       std::map<std::string, net::Rights>{{"view", net::Rights::view},

@@ -36,20 +36,30 @@ FoxgloveClient::FoxgloveClient(std::shared_ptr<WebSocket> socket, std::vector<Mo
       ended_(std::move(ended)) {}
 
 void FoxgloveClient::start() {
-  std::vector<std::string> prefixes;
-  prefixes.reserve(mounts_.size());
-  for (const Mount& place : mounts_) prefixes.push_back(place.prefix);
   send(server_info(program_));
+  introduce(0);
+  read();
+}
+
+void FoxgloveClient::add(Mount place) {
+  if (closed_) return;
+  mounts_.push_back(std::move(place));
+  introduce(mounts_.size() - 1);
+}
+
+/// The sensors from there on, with what is known of them.
+void FoxgloveClient::introduce(std::size_t first) {
+  std::vector<std::string> prefixes;
+  for (std::size_t i = first; i < mounts_.size(); ++i) prefixes.push_back(mounts_[i].prefix);
   advertise_channels();
-  send(advertise_services(prefixes));
+  send(advertise_services(first, prefixes));
   update_want();
-  for (const Mount& place : mounts_) {
-    const Source& source = place.sensor->source();
+  for (std::size_t i = first; i < mounts_.size(); ++i) {
+    const Source& source = mounts_[i].sensor->source();
     if (!source.connected()) {
       send(status(kWarning, fmt::format("the daemon of {} is away", source.name()), source.name()));
     }
   }
-  read();
 }
 
 /// Those that it does not know yet, and takes back those that are there no more: behind an address

@@ -44,6 +44,8 @@ class FoxgloveClient : public SensorTopics::Listener,
                  std::function<void(const std::string&)> ended);
 
   void start();
+  /// Another sensor, after start().
+  void add(Mount place);
   void close(const std::string& reason);
   [[nodiscard]] const net::Tokens::Grant& grant() const noexcept { return grant_; }
 
@@ -64,6 +66,7 @@ class FoxgloveClient : public SensorTopics::Listener,
 
   void read();
   void take(bool text);
+  void introduce(std::size_t first);
   void advertise_channels();
   void subscribe(const SubscriptionRequest& request);
   void update_want();

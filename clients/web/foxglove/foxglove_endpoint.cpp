@@ -43,9 +43,9 @@ void refuse(const std::shared_ptr<WebSocket>& socket, const std::string& sentenc
 
 }  // namespace
 
-FoxgloveEndpoint::FoxgloveEndpoint(const std::vector<std::shared_ptr<Source>>& sources,
+FoxgloveEndpoint::FoxgloveEndpoint(const std::vector<std::shared_ptr<Source>>& sources, bool find,
                                    const net::NetConfig& config, net::Admission& admission)
-    : config_(config), admission_(admission) {
+    : find_(find), config_(config), admission_(admission) {
   sensors_.reserve(sources.size());
   for (const auto& source : sources) sensors_.push_back(std::make_shared<SensorTopics>(source));
 }
@@ -56,20 +56,25 @@ void FoxgloveEndpoint::start() {
 
 void FoxgloveEndpoint::add(std::shared_ptr<Source> source) {
   sensors_.push_back(std::make_shared<SensorTopics>(std::move(source)));
-  sensors_.back()->start();
+  const auto& sensor = sensors_.back();
+  sensor->start();
+  for (const Client& one : clients_) {
+    const auto client = one.all ? one.client.lock() : nullptr;
+    if (client != nullptr) client->add({sensor, "/" + sensor->source().name()});
+  }
 }
 
 void FoxgloveEndpoint::stop() {
-  for (const auto& weak : std::exchange(clients_, {})) {
-    if (const auto client = weak.lock()) client->close("dtact-web ends");
+  for (const Client& one : std::exchange(clients_, {})) {
+    if (const auto client = one.client.lock()) client->close("dtact-web ends");
   }
   for (const auto& sensor : sensors_) sensor->stop();
 }
 
 void FoxgloveEndpoint::end_revoked() {
   const auto clients = clients_;
-  for (const auto& weak : clients) {
-    const auto client = weak.lock();
+  for (const Client& one : clients) {
+    const auto client = one.client.lock();
     if (client == nullptr || admission_.still_allows(client->grant())) continue;
     client->close("its token was revoked, or given other rights");
   }
@@ -79,11 +84,10 @@ std::vector<Mount> FoxgloveEndpoint::mounts(std::string_view path) const {
   std::vector<Mount> found;
   for (const auto& sensor : sensors_) {
     const std::string& name = sensor->source().name();
+    const bool own = path == fmt::format("/sensors/{}/foxglove", name);
     // One sensor's topics are called as in a recording of it.
-    const bool alone = sensors_.size() == 1 || path == fmt::format("/sensors/{}/foxglove", name);
-    if (path == "/foxglove" || path == fmt::format("/sensors/{}/foxglove", name)) {
-      found.push_back({sensor, alone ? "" : "/" + name});
-    }
+    const bool alone = own || (sensors_.size() == 1 && !find_);
+    if (own || path == kAll) found.push_back({sensor, alone ? "" : "/" + name});
   }
   return found;
 }
@@ -99,13 +103,13 @@ Upgrade FoxgloveEndpoint::upgrade(const Request& request) {
   return {
       .subprotocol = subprotocol,
       .max_message = kMaxMessage,
-      .open = [this, mounts = mounts(target.substr(0, target.find('?'))), token = token_of(target)](
+      .open = [this, path = target.substr(0, target.find('?')), token = token_of(target)](
                   std::shared_ptr<WebSocket> socket, const net::Peer& peer,
-                  const std::shared_ptr<void>&) { admit(std::move(socket), peer, token, mounts); }};
+                  const std::shared_ptr<void>&) { admit(std::move(socket), peer, token, path); }};
 }
 
 void FoxgloveEndpoint::admit(std::shared_ptr<WebSocket> socket, const net::Peer& peer,
-                             const std::string& token, std::vector<Mount> mounts) {
+                             const std::string& token, std::string_view path) {
   const auto verdict = admission_.enter(peer, token);
   if (!verdict.grant) {
     config_.log({net::LogLevel::warning,
@@ -129,9 +133,9 @@ void FoxgloveEndpoint::admit(std::shared_ptr<WebSocket> socket, const net::Peer&
   const std::string identity =
       fmt::format("{} (Foxglove{}{})", peer.address, name.empty() ? "" : ", token ", name);
   const auto client = std::make_shared<FoxgloveClient>(
-      std::move(socket), std::move(mounts), *verdict.grant, identity, config_.program, ended);
-  std::erase_if(clients_, [](const auto& weak) { return weak.expired(); });
-  clients_.push_back(client);
+      std::move(socket), mounts(path), *verdict.grant, identity, config_.program, ended);
+  std::erase_if(clients_, [](const Client& one) { return one.client.expired(); });
+  clients_.push_back({client, path == kAll});
   client->start();
 }
 

@@ -16,29 +16,38 @@ namespace dtact::web::foxglove {
 /// Where Foxglove's clients come in: /foxglove for all sensors, /sensors/NAME/foxglove for one.
 class FoxgloveEndpoint {
  public:
-  /// What is passed by reference must outlive it.
-  FoxgloveEndpoint(const std::vector<std::shared_ptr<Source>>& sources,
+  /// `find`: others will be added. What is passed by reference must outlive it.
+  FoxgloveEndpoint(const std::vector<std::shared_ptr<Source>>& sources, bool find,
                    const net::NetConfig& config, net::Admission& admission);
 
   void start();
-  /// Another sensor, after start().
+  /// Another sensor, after start(), also for the clients of /foxglove.
   void add(std::shared_ptr<Source> source);
   void stop();
   /// Ends the clients whose token was revoked or has other rights now.
   void end_revoked();
   /// Whether a path is one of this door's.
-  [[nodiscard]] bool knows(std::string_view path) const { return !mounts(path).empty(); }
+  [[nodiscard]] bool knows(std::string_view path) const {
+    return path == kAll || !mounts(path).empty();
+  }
   [[nodiscard]] Upgrade upgrade(const Request& request);
 
  private:
+  struct Client {
+    std::weak_ptr<FoxgloveClient> client;
+    bool all;  ///< It has all sensors.
+  };
+  static constexpr std::string_view kAll = "/foxglove";
+
   [[nodiscard]] std::vector<Mount> mounts(std::string_view path) const;
   void admit(std::shared_ptr<WebSocket> socket, const net::Peer& peer, const std::string& token,
-             std::vector<Mount> mounts);
+             std::string_view path);
 
+  const bool find_;
   const net::NetConfig& config_;
   net::Admission& admission_;
   std::vector<std::shared_ptr<SensorTopics>> sensors_;
-  std::vector<std::weak_ptr<FoxgloveClient>> clients_;
+  std::vector<Client> clients_;
 };
 
 }  // namespace dtact::web::foxglove

@@ -127,7 +127,7 @@ std::string unadvertise(const std::vector<Channels>& all) {
   return fmt::format(R"({{"op":"unadvertise","channelIds":[{}]}})", fmt::join(ids, ","));
 }
 
-std::string advertise_services(const std::vector<std::string>& prefixes) {
+std::string advertise_services(std::size_t first, const std::vector<std::string>& prefixes) {
   std::string all;
   for (std::size_t sensor = 0; sensor < prefixes.size(); ++sensor) {
     for (std::size_t i = 0; i < kServices; ++i) {
@@ -135,7 +135,7 @@ std::string advertise_services(const std::vector<std::string>& prefixes) {
       if (!all.empty()) all += ',';
       all +=
           fmt::format(R"({{"id":{},"name":{},"type":{},"request":{},"response":{}}})",
-                      service_id(sensor, static_cast<Service>(i)),
+                      service_id(first + sensor, static_cast<Service>(i)),
                       cli::json_string(prefixes[sensor] + info.name), cli::json_string(info.type),
                       schema_part(std::string(info.type) + "_Request", info.request),
                       schema_part(std::string(info.type) + "_Response", info.response));

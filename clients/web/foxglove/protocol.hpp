@@ -38,12 +38,13 @@ struct Channels {
   Topics topics;
 };
 
-// Messages of the server. `prefixes`: prefix of each sensor's services.
+// Messages of the server. `prefixes`: prefix of the services of each sensor from the `first` on.
 
 [[nodiscard]] std::string server_info(std::string_view program);
 [[nodiscard]] std::string advertise(const std::vector<Channels>& all);
 [[nodiscard]] std::string unadvertise(const std::vector<Channels>& all);
-[[nodiscard]] std::string advertise_services(const std::vector<std::string>& prefixes);
+[[nodiscard]] std::string advertise_services(std::size_t first,
+                                             const std::vector<std::string>& prefixes);
 /// `level`: 0 information, 1 warning, 2 error. One of the same `id` replaces the one before.
 [[nodiscard]] std::string status(int level, std::string_view sentence, std::string_view id = "");
 /// Withdraws the status of this id.

@@ -157,6 +157,43 @@ TEST(FoxgloveClient, SubscriptionsEndWithTheirChannels) {
   source->stop();
 }
 
+// Before: Foxglove had to connect again for a sensor that was found later.
+TEST(FoxgloveClient, GetsSensorsThatAreFoundLater) {
+  asio::io_context io;
+  const auto sensor_of = [&](const char* name) {
+    return std::make_shared<SensorTopics>(std::make_shared<Source>(io, name, client::Options{}));
+  };
+  const auto socket = std::make_shared<SlowSocket>(io);
+  const auto client = std::make_shared<FoxgloveClient>(
+      socket, std::vector<Mount>{{sensor_of("left"), "/left", {}}}, net::Tokens::Grant{}, "viewer",
+      "test", [](const std::string&) {});
+  client->start();
+  while (socket->finish_write()) {
+  }
+  socket->sent.clear();
+  const auto right = sensor_of("right");
+  client->add({right, "/right", {}});
+  while (socket->finish_write()) {
+  }
+  ASSERT_EQ(socket->sent.size(), 3U);
+  EXPECT_NE(socket->sent[0].find(fmt::format(R"("id":{},"topic":"/right/dtact/depth")",
+                                             kTopics + index(Topic::depth) + 1)),
+            std::string::npos)
+      << socket->sent[0];
+  EXPECT_EQ(socket->sent[0].find("/left"), std::string::npos);
+  EXPECT_NE(socket->sent[1].find(
+                fmt::format(R"("id":{},"name":"/right/dtact/set_light")", kServices + 1)),
+            std::string::npos)
+      << socket->sent[1];
+  EXPECT_EQ(socket->sent[2],
+            R"({"op":"status","level":1,"message":"the daemon of right is away","id":"right"})");
+  socket->receive(fmt::format(R"({{"op":"subscribe","subscriptions":[{{"id":7,"channelId":{}}}]}})",
+                              kTopics + index(Topic::depth) + 1));
+  client->on_message(*right, Topic::depth, std::make_shared<const Message>(Message{1, "map"}));
+  EXPECT_TRUE(socket->sent.back().ends_with("map"));
+  client->close("over");
+}
+
 // Before: 40 clients that did not read had 620 MB of such answers.
 TEST(FoxgloveClient, AnswersAreShortWhateverTheyRepeat) {
   asio::io_context io;

@@ -38,7 +38,7 @@ TEST(FoxgloveProtocol, Heads) {
 
 // Two schemas of one name are an error to Foxglove.
 TEST(FoxgloveProtocol, RequestAndResponseHaveSchemasOfTheirOwn) {
-  const std::string services = advertise_services({"/left"});
+  const std::string services = advertise_services(0, {"/left"});
   for (const char* name : {"dtact.v1.SetLight_Request", "dtact.v1.SetLight_Response",
                            "dtact.v1.Rezero_Request", "dtact.v1.Rezero_Response"}) {
     const std::string quoted = fmt::format(R"("schemaName":"{}")", name);

@@ -175,6 +175,28 @@ TEST(Source, ARefusedSubscriptionLeavesOneThatIsBeingOpened) {
   source->stop();
 }
 
+// Before: a program on the desktop was refused as a foreign page until a daemon was found.
+TEST(Server, ForFoxgloveNoSensorNeedsToBeFoundYet) {
+  boost::asio::io_context io;
+  Settings settings;
+  settings.net.port = 0;
+  settings.net.log = [](const net::LogLine&) {};
+  settings.find = true;
+  const Page page;
+  const auto server = std::make_shared<Server>(io, std::move(settings), page);
+  Request request;
+  request.set(boost::beast::http::field::host, "127.0.0.1");
+  request.set(boost::beast::http::field::origin, "file://");
+  request.set(boost::beast::http::field::sec_websocket_protocol, "foxglove.sdk.v1");
+  const auto status_of = [&](const char* path) {
+    request.target(path);
+    return server->upgrade(request, {}).refusal.status;
+  };
+  EXPECT_EQ(status_of("/sensors/left/foxglove"), boost::beast::http::status::forbidden);
+  EXPECT_NE(status_of("/foxglove"), boost::beast::http::status::forbidden);
+  server->stop();
+}
+
 // Before: the exception ended the program, which found the same daemons again.
 TEST(Server, WithoutDescriptorsLeavesOutWhatIsFound) {
   if (test::kNeedsDescriptors) GTEST_SKIP() << "the sanitizer needs descriptors";
