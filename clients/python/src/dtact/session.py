@@ -208,7 +208,8 @@ class Session:
         if request.averages and self._server is not None:
             return self._timeout + self._server.rezero_timeout_s
         seconds = max(self._timeout, _SLOW_S) if request.slow else self._timeout
-        return seconds + request.message.ByteSize() / _SLOWEST_BYTES_PER_S
+        size: int = request.message.ByteSize()
+        return seconds + size / _SLOWEST_BYTES_PER_S
 
     def _subscribe_request(self, subscription: Subscription | None,
                            again: bool = False) -> Request[None]:
