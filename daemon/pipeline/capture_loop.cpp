@@ -63,8 +63,6 @@ void CaptureLoop::step() noexcept {
   exchange_.turns.fetch_add(1, std::memory_order_relaxed);
   take_notes();
   executor_.take(watch_.away(), stamp(clock_.monotonic_ns()));
-  // Read once for each frame, so that none has only a part of a new request.
-  wanted_ = exchange_.wanted.load(std::memory_order_relaxed);
   choose_area();
   const std::int64_t asked_ns = clock_.monotonic_ns();
   const hal::GrabStatus status = camera_.grab(frame_, timeout_);
@@ -96,7 +94,8 @@ void CaptureLoop::take_notes() noexcept {
 // Decoding is most of the work on a frame, so decodes only the area that is used.
 void CaptureLoop::choose_area() noexcept {
   hal::Area area = whole_;
-  if (executor_.active() != nullptr && !tracker_.needs_whole_frame() && !wanted_.luma) {
+  if (executor_.active() != nullptr && !tracker_.needs_whole_frame() &&
+      !exchange_.wanted.load(std::memory_order_relaxed).luma) {
     const recon::FrameRegion region = executor_.active()->image.cells.lattice().region();
     area = {region.x, region.y, region.width, region.height};
   }
@@ -117,6 +116,8 @@ void CaptureLoop::process(std::int64_t now_ns) noexcept {
   exchange_.sequence.store(info.sequence, std::memory_order_relaxed);
   exchange_.light_lag_ns.store(timeline_.delay_ns() + stamp_lag_ns(info.meaning, period_ns_),
                                std::memory_order_relaxed);
+  // Read once for each frame, so that none has only a part of a new request.
+  wanted_ = exchange_.wanted.load(std::memory_order_relaxed);
   const bool moved = (info.flags & hal::kFrameControlsMoved) != 0;
   // They have just been set back. A reference of the last second may be of what they had moved to.
   if (moved && !controls_moved_) tracker_.camera_began();
@@ -183,7 +184,7 @@ void CaptureLoop::publish(DepthFrame& out) noexcept {
   const std::int64_t began_ns = clock_.monotonic_ns();
   const bool made = out.has_depth;
   out.has_depth = made && wanted_.depth;
-  out.has_luma = wanted_.luma;
+  out.has_luma = wanted_.luma && area_ == whole_;  // outside the area anything may be
   if (out.has_luma) {
     const hal::LumaView& luma = frame_.luma();
     const auto width = static_cast<std::size_t>(luma.width);

@@ -76,7 +76,7 @@ class CaptureLoop {
   const hal::Area whole_;        // frame
   hal::Area area_;               // the requested part of the frame
   const bool unusable_;          // the first calibration is for another camera mode
-  Wanted wanted_;                // before the newest frame was grabbed
+  Wanted wanted_;                // when the newest frame came
   bool controls_moved_ = false;  // according to the newest frame
 };
 
