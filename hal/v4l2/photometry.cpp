@@ -196,8 +196,10 @@ std::vector<LockedControl> PhotometricLock::apply(int fd, const fs::path& usb_de
     }
     std::int64_t value = control.off.value_or(offered->default_value);
     if (configured != config_.controls.end()) value = configured->second;
-    if (exposure) value = std::max<std::int64_t>(1, std::llround(exposure_us_ / kExposureUnitUs));
-    value = nearest(*offered, value);
+    if (exposure) {
+      value = nearest(*offered,
+                      std::max<std::int64_t>(1, std::llround(exposure_us_ / kExposureUnitUs)));
+    }
     controls.push_back(lock(fd, control, *offered, value, usb_device));
     CameraControl& result = controls.back().control;
     if (result.verdict == ControlVerdict::refused) {
