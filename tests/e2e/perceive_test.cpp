@@ -1,7 +1,5 @@
 // dtact-perceive beside a daemon on the simulated sensor: its messages and motion, compared with
 // the pressed object.
-#include "tests/e2e/perceive.hpp"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -10,6 +8,8 @@
 #include <thread>
 
 #include "tests/e2e/press.hpp"
+#include "tests/e2e/sensor.hpp"
+#include "tests/fakes/perceive_server.hpp"
 
 namespace dtact::e2e {
 namespace {
@@ -18,7 +18,7 @@ TEST(Perceive, FollowsASlidingBallWithoutItsRotation) {
   const TempFolder folder;
   const Press press(folder);
   const Sensor sensor(press.file);
-  const Perceive perceive(sensor);
+  const fakes::PerceiveServer perceive(sensor.options());
   client::Client client = perceive.connect();
   v1::Subscribe subscription;
   subscription.set_pose(true);
@@ -66,7 +66,7 @@ TEST(Perceive, FollowsASlidingBallWithoutItsRotation) {
 
 TEST(Perceive, RefusesWhatTheDaemonServesAndIsRefusedItsOwnThere) {
   const Sensor sensor;
-  const Perceive perceive(sensor);
+  const fakes::PerceiveServer perceive(sensor.options());
   client::Client client = perceive.connect();
   EXPECT_TRUE(client.has_feature("cloud"));
   EXPECT_THROW(client.subscribe(), client::Refused);
@@ -81,7 +81,7 @@ TEST(Perceive, RefusesWhatTheDaemonServesAndIsRefusedItsOwnThere) {
 
 TEST(Perceive, AsksTheDaemonForNothingThatNobodyWants) {
   const Sensor sensor;
-  const Perceive perceive(sensor);
+  const fakes::PerceiveServer perceive(sensor.options());
   client::Client client = perceive.connect();
   client::Client daemon = sensor.connect();
   std::this_thread::sleep_for(std::chrono::milliseconds(500));

@@ -11,8 +11,9 @@
 
 #include "hal/sim/placement.hpp"
 #include "hal/sim/truth.hpp"
-#include "tests/e2e/perceive.hpp"
 #include "tests/e2e/press.hpp"
+#include "tests/e2e/sensor.hpp"
+#include "tests/fakes/perceive_server.hpp"
 
 namespace dtact::e2e {
 namespace {
@@ -21,7 +22,7 @@ TEST(Points, OfTheContactDuringContact) {
   const TempFolder folder;
   const Press press(folder);
   const Sensor sensor(press.file);
-  const Perceive perceive(sensor);
+  const fakes::PerceiveServer perceive(sensor.options());
   client::Client client = perceive.connect();
   v1::Subscribe subscription;
   subscription.set_cloud(v1::CLOUD_INT16);
@@ -111,7 +112,7 @@ TEST_P(PointsOfABall, LieOnIt) {
   base::write_file_atomically(file, text);
   const Sensor sensor(press.file, false,
                       {"calibration=" + calibration.string(), "reconstruction.sharpen=1"});
-  const Perceive perceive(sensor);
+  const fakes::PerceiveServer perceive(sensor.options());
   client::Client client = perceive.connect();
   v1::Subscribe subscription;
   subscription.set_cloud(v1::CLOUD_FLOAT32);
@@ -163,7 +164,7 @@ keys = [ {{ t = 3.0, x = {}, y = {}, depth = -0.3 }}, {{ t = 4.0, depth = 1.0 }}
   text.replace(height, text.find(' ', height + 9) - height, "per_mm = 0.04");
   base::write_file_atomically(file, text);
   const Sensor sensor(scene_file, false, {"calibration=" + calibration.string()});
-  const Perceive perceive(sensor);
+  const fakes::PerceiveServer perceive(sensor.options());
   client::Client client = perceive.connect();
   v1::Subscribe subscription;
   subscription.set_cloud(v1::CLOUD_FLOAT32);

@@ -56,12 +56,17 @@ Sensor::Sensor(const fs::path& scene, bool calibrated, const std::vector<std::st
   daemon = std::make_unique<DaemonProcess>(arguments);
 }
 
-client::Client Sensor::connect(const std::string& program) const {
+client::Options Sensor::options() const {
   client::Options options;
   options.port = daemon->port();
-  options.program = program;
-  options.timeout = std::chrono::seconds(20);
-  return client::Client(options);
+  return options;
+}
+
+client::Client Sensor::connect(const std::string& program) const {
+  client::Options wanted = options();
+  wanted.program = program;
+  wanted.timeout = std::chrono::seconds(20);
+  return client::Client(wanted);
 }
 
 void Sensor::restart() {

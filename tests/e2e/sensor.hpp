@@ -36,6 +36,8 @@ struct Sensor {
   Sensor(const Sensor&) = delete;
   Sensor& operator=(const Sensor&) = delete;
 
+  /// How clients reach the daemon.
+  [[nodiscard]] client::Options options() const;
   [[nodiscard]] client::Client connect(const std::string& program = "e2e") const;
   /// Ends the daemon and starts it again on the same state folder.
   void restart();

@@ -5,17 +5,15 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
-#include <boost/asio/io_context.hpp>
-#include <boost/asio/post.hpp>
 #include <chrono>
 #include <functional>
-#include <mutex>
 #include <sstream>
 #include <string>
 #include <thread>
 
 #include "clients/cpp/client.hpp"
 #include "clients/perceive/perceive.hpp"
+#include "tests/fakes/perceive_server.hpp"
 #include "tests/unit/client/played_daemon.hpp"
 
 namespace dtact::perceive {
@@ -24,48 +22,8 @@ namespace {
 using client::test::kLong;
 using client::test::Peer;
 using client::test::PlayedDaemon;
+using fakes::PerceiveServer;
 using testing::HasSubstr;
-
-/// The server on a thread of its own.
-class Running {
- public:
-  explicit Running(const client::Options& daemon) {
-    net::NetConfig config;
-    config.port = 0;
-    config.features = wire::kPerceiveFeatures;
-    config.log = [this](const net::LogLine& line) {
-      const std::scoped_lock lock(mutex_);
-      log_ += line.text + '\n';
-    };
-    server_ = std::make_shared<Server>(io_, config, daemon);
-    server_->start();
-    thread_ = std::thread([this] { io_.run(); });
-  }
-  ~Running() {
-    boost::asio::post(io_, [this] { server_->stop(); });
-    thread_.join();
-  }
-  Running(const Running&) = delete;
-  Running& operator=(const Running&) = delete;
-
-  [[nodiscard]] client::Client connect() const {
-    client::Options options;
-    options.port = server_->port();
-    return client::Client(options);
-  }
-  [[nodiscard]] std::uint16_t port() const { return server_->port(); }
-  [[nodiscard]] std::string log() const {
-    const std::scoped_lock lock(mutex_);
-    return log_;
-  }
-
- private:
-  mutable std::mutex mutex_;
-  std::string log_;
-  boost::asio::io_context io_;
-  std::shared_ptr<Server> server_;
-  std::thread thread_;
-};
 
 /// The first status for which `done` is true; after kLong the last one.
 v1::Status status_when(client::Client& client, const std::function<bool(const v1::Status&)>& done) {
@@ -95,15 +53,15 @@ TEST(Server, SaysThatTheDaemonIsAway) {
     const PlayedDaemon gone({});
     nobody = gone.options;
   }
-  const Running running(nobody);
-  client::Client client = running.connect();
+  const PerceiveServer server(nobody);
+  client::Client client = server.connect();
   const v1::Status status = status_when(
       client, [](const v1::Status& one) { return one.advice().find("yet") == std::string::npos; });
   EXPECT_NE(status.state(), v1::STATE_SERVING);
   EXPECT_THAT(status.advice(), HasSubstr(std::to_string(nobody.port)));
   std::ostringstream out;
   std::ostringstream error;
-  EXPECT_EQ(run({"--port", std::to_string(running.port()), "watch", "--seconds", "4"}, out, error),
+  EXPECT_EQ(run({"--port", std::to_string(server.port()), "watch", "--seconds", "4"}, out, error),
             0)
       << error.str();
   EXPECT_THAT(out.str(), HasSubstr("no frames: " + status.advice() + "\n"));
@@ -114,14 +72,14 @@ TEST(Server, IntroducesItselfWithTheDaemonsNameAndFrame) {
     greet(peer);
     for (;;) peer.done();
   }});
-  const Running running(daemon.options);
-  client::Client first = running.connect();
+  const PerceiveServer server(daemon.options);
+  client::Client first = server.connect();
   const v1::Status status = status_when(first, serves);
   EXPECT_EQ(status.state(), v1::STATE_SERVING);
   EXPECT_EQ(status.advice(), "");
   EXPECT_EQ(status.name(), "left");
   EXPECT_EQ(status.serial(), "S7");
-  const client::Client client = running.connect();
+  const client::Client client = server.connect();
   EXPECT_EQ(client.server().surface_frame().frame_id(), "left_finger");
   EXPECT_EQ(client.server().name(), "left");
   EXPECT_EQ(client.server().serial(), "S7");
@@ -146,8 +104,8 @@ TEST(Server, LogsFramesThatItCannotReadOnce) {
     }
     peer.request();  // until the end
   }});
-  const Running running(daemon.options);
-  client::Client client = running.connect();
+  const PerceiveServer server(daemon.options);
+  client::Client client = server.connect();
   (void)status_when(client, serves);
   v1::Subscribe summary;
   summary.set_summary(true);
@@ -161,7 +119,7 @@ TEST(Server, LogsFramesThatItCannotReadOnce) {
   EXPECT_EQ(status.frames(), kFrames);
   EXPECT_THAT(status.advice(), HasSubstr("a shape, 9,"));
   EXPECT_NE(status.state(), v1::STATE_SERVING);
-  const std::string log = running.log();
+  const std::string log = server.log();
   const std::size_t first = log.find("a shape, 9,");
   EXPECT_NE(first, std::string::npos) << log;
   EXPECT_EQ(log.find("a shape, 9,", first + 1), std::string::npos) << log;
