@@ -199,11 +199,14 @@ TEST(Start, NamesTheCheckOfAConfigurationWithAMistake) {
               AllOf(StartsWith("STATUS=--set: camera.width"), EndsWith("dtactd --check-config")));
 }
 
-/// Whether the process has the file open.
-bool has_open(pid_t pid, const fs::path& file) {
+/// Whether the process has opened the file to read it only. Until it runs its own program, it has
+/// the descriptor with which this one writes.
+bool reads(pid_t pid, const fs::path& file) {
   std::error_code ignored;  // one that is closed meanwhile
   for (const auto& entry : fs::directory_iterator(fmt::format("/proc/{}/fd", pid), ignored)) {
-    if (fs::read_symlink(entry.path(), ignored) == file) return true;
+    if (fs::read_symlink(entry.path(), ignored) != file) continue;
+    const fs::perms access = entry.symlink_status(ignored).permissions();
+    if ((access & fs::perms::owner_write) == fs::perms::none) return true;
   }
   return false;
 }
@@ -219,10 +222,10 @@ TEST(Start, EndsWithTheStepInWhichItIsAskedTo) {
   Program daemon({DTACTD_PROGRAM, "--set", "net.port=0", "--set",
                   "state_dir=" + folder.path().string(), "--set",
                   "camera.sim.scene=" + scene.string()});
-  for (int i = 0; i < 6000 && !has_open(daemon.pid(), scene); ++i) {
+  for (int i = 0; i < 6000 && !reads(daemon.pid(), scene); ++i) {
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
   }
-  ASSERT_TRUE(has_open(daemon.pid(), scene)) << daemon.log();
+  ASSERT_TRUE(reads(daemon.pid(), scene)) << daemon.log();
   ASSERT_EQ(::kill(daemon.pid(), SIGTERM), 0);
   writer.reset();  // an empty scene
   EXPECT_EQ(daemon.stop(0), 0);
