@@ -56,7 +56,6 @@ void Device::loop() {
     deadline += period;
     if (const std::int64_t late = (now - deadline) / period; now > deadline && late > 0) {
       sequence_ += static_cast<std::uint64_t>(late);
-      lost_ += static_cast<std::uint64_t>(late);
       deadline += late * period;
       // What was skipped was exposed all the same.
       for (std::int64_t i = std::min<std::int64_t>(late, std::ssize(seen_)); i > 0; --i) {

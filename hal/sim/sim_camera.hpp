@@ -17,7 +17,7 @@ void check(const CameraConfig& config);
 /// frame one period ahead and delivers it at its deadline. grab() unpacks the payload as it would
 /// a real camera's. The device keeps three payloads: one it fills, the newest complete one, one
 /// that grab() reads. A newer frame replaces an unfetched one. When the device falls behind,
-/// its sequence jumps.
+/// its sequence jumps; those frames count as skipped, as this process came late.
 ///
 /// With config.sim.paced == false there is no thread: every grab() makes the next frame of the
 /// sequence, none is skipped, and scripted gaps pass without waiting.

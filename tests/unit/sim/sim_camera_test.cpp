@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "hal/base/atomic_file.hpp"
+#include "hal/base/clock.hpp"
 #include "hal/sim/renderer.hpp"
 #include "hal/sim/sim_ring.hpp"
 #include "tests/unit/sim/small_scene.hpp"
@@ -321,6 +322,33 @@ TEST_F(SimCameraTest, PacedFramesComeInOrderAndTheNewestFirst) {
   EXPECT_EQ(report.delivered, 21U);
   EXPECT_EQ(report.delivered + report.lost + report.skipped, last + 1);
   EXPECT_EQ(camera.grab(frame, 0s), GrabStatus::timeout);
+}
+
+/// The machine's clock, but each wait is longer by five frames of the camera.
+class LateClock final : public base::Clock {
+ public:
+  [[nodiscard]] std::int64_t monotonic_ns() const noexcept override {
+    return base::system_clock().monotonic_ns();
+  }
+  [[nodiscard]] std::int64_t wall_ns() const noexcept override {
+    return base::system_clock().wall_ns();
+  }
+  void sleep_until(std::int64_t deadline_ns) noexcept override {
+    base::system_clock().sleep_until(deadline_ns + 50'000'000);
+  }
+};
+
+TEST_F(SimCameraTest, FramesThatABusyMachineDoesNotMakeAreSkippedNotLost) {
+  LateClock clock;
+  SimCamera camera(config("", "luma", true), link_, clock);
+  camera.start();
+  Frame frame;
+  for (int i = 0; i < 3; ++i) {
+    ASSERT_EQ(camera.grab(frame, 30s), GrabStatus::ok);
+    EXPECT_EQ(frame.info().flags, kFrameNormal);
+  }
+  EXPECT_EQ(camera.report().lost, 0U);
+  EXPECT_GE(camera.report().skipped, 6U);
 }
 
 TEST_F(SimCameraTest, PacedUnplugIsReportedAtOnceAndEnds) {
