@@ -36,7 +36,7 @@ base::UniqueFd lock(const std::string& part) {
 }
 
 /// Returns `file`. Throws unless it may be written.
-const std::string& checked(const std::string& file, bool replace) {
+std::string checked(std::string file, bool replace) {
   if (replace || !fs::exists(file)) return file;
   throw std::runtime_error(file + " exists: name another file, or add --force");
 }
