@@ -61,14 +61,17 @@ class Perceive(unittest.TestCase):
             whole.subscribe()
             s.subscribe(dtact.Subscription(depth=None, cloud="float32"))
             until = time.monotonic() + 60
-            depths = {}
+            depths, clouds = {}, {}  # either may come first
             for f in s.frames():
+                if f.has_cloud and f.contact.deepest_mm > 0.3:
+                    clouds[f.sequence] = f.cloud
                 while isinstance(one := whole.next(0), dtact.Frame):
                     depths[one.sequence] = one
-                if f.has_cloud and f.contact.deepest_mm > 0.3 and f.sequence in depths:
+                if both := clouds.keys() & depths.keys():
                     break
                 self.assertLess(time.monotonic(), until, "no frame came from both within a minute")
-        made, cloud = depths[f.sequence].points(), f.cloud
+        sequence = both.pop()
+        made, cloud = depths[sequence].points(), clouds[sequence]
         self.assertEqual((made.points.shape, made.decimation), (cloud.points.shape, cloud.decimation))
         np.testing.assert_array_equal(made.valid, cloud.valid)
         np.testing.assert_allclose(made.points, cloud.points, atol=1e-8)
