@@ -39,7 +39,7 @@ TEST(Upload, HasLongerThanASmallRequest) {
   Session session(daemon.options);
   v1::ClientMessage message;
   // More than the buffers of two sockets hold.
-  message.mutable_upload_calibration()->set_reference_png(std::string(12'000'000, 'p'));
+  message.mutable_upload_calibration()->mutable_reference_png()->resize(12'000'000, 'p');
   EXPECT_TRUE(session.request(message, daemon.options.timeout).has_done());
 }
 

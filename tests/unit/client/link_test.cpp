@@ -27,7 +27,7 @@ struct Linked {
 /// More than the buffers of two sockets hold.
 std::string large_upload() {
   v1::ClientMessage message;
-  message.mutable_upload_calibration()->set_reference_png(std::string(12'000'000, 'p'));
+  message.mutable_upload_calibration()->mutable_reference_png()->resize(12'000'000, 'p');
   return message.SerializeAsString();
 }
 
