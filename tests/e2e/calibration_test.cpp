@@ -9,6 +9,7 @@
 #include <filesystem>
 #include <fstream>
 #include <set>
+#include <string>
 #include <thread>
 
 #include "hal/base/atomic_file.hpp"
@@ -279,7 +280,13 @@ TEST_F(TwoCalibrations, ADaemonThatOneKeepsFromStartingBeginsWithTheConfiguredOn
       << output;
   ASSERT_EQ(activate("1", &output), 0) << output;
   EXPECT_TRUE(depth_flows_again_at(kOther));
-  EXPECT_THAT(sensor_.connect().status().advice(), Not(HasSubstr("is not used")));
+  // A busy machine leaves frames out for a while, and the status advises on that.
+  std::string advice = sensor_.connect().status().advice();
+  for (int i = 0; i < 30 && !advice.empty(); ++i) {
+    std::this_thread::sleep_for(std::chrono::seconds(1));
+    advice = sensor_.connect().status().advice();
+  }
+  EXPECT_EQ(advice, "");
   sensor_.restart();
   EXPECT_TRUE(depth_flows_again_at(kOther));
 }

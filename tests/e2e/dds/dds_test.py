@@ -532,18 +532,20 @@ class Hostile(unittest.TestCase):
             stalled.process.send_signal(signal.SIGSTOP)
             try:
                 time.sleep(1)
-                first = peer.next("rt/right/contact", "dtact_msgs/Contact",
-                                  lambda _: peer.samples["rt/right/contact"].empty())
-                time.sleep(4)
-                last = first
-                received = 0
-                while not peer.samples["rt/right/contact"].empty():
-                    last = peer.next("rt/right/contact", "dtact_msgs/Contact")
-                    received += 1
+                for _ in range(5):  # a busy machine loses more for a while
+                    first = peer.next("rt/right/contact", "dtact_msgs/Contact",
+                                      lambda _: peer.samples["rt/right/contact"].empty())
+                    time.sleep(4)
+                    last = first
+                    received = 0
+                    while not peer.samples["rt/right/contact"].empty():
+                        last = peer.next("rt/right/contact", "dtact_msgs/Contact")
+                        received += 1
+                    if received > 0.8 * (last.frame_number - first.frame_number):
+                        break
             finally:
                 stalled.process.send_signal(signal.SIGCONT)
-            # A busy machine loses some.
-            self.assertGreater(received, 0.5 * (last.frame_number - first.frame_number))
+            self.assertGreater(received, 0.8 * (last.frame_number - first.frame_number))
             self.assertGreater(ns(last.header.stamp) - ns(first.header.stamp), 3_000_000_000)
 
     def test_two_domains_are_apart(self) -> None:
