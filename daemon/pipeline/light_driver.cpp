@@ -181,8 +181,13 @@ void LightDriver::come_back() {
 }
 
 hal::ShowResult LightDriver::write(const hal::Light& light) {
-  note({true, clock_.monotonic_ns(), light});
+  // The same bytes once more change no picture, as the ring's own re-sends.
+  const bool again = shown_ns_ && !trouble_ && light == light_;
+  const std::int64_t began_ns = clock_.monotonic_ns();
+  if (!again) note({true, began_ns, light});
   hal::ShowResult result = ring_->show(light);
+  if (again && result.ok) return result;
+  if (again) note({true, began_ns, light});
   trouble_ = !result.ok;
   const bool was_away = std::exchange(away_, result.away);
   const std::int64_t ended_ns = clock_.monotonic_ns();

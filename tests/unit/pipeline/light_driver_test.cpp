@@ -89,6 +89,28 @@ TEST_F(LightDriverTest, TheLastWriterWins) {
   EXPECT_EQ(ring.all().back().brightness, 9);
 }
 
+// Before: a client that repeated the brightness ten times a second left no frame with depth at 20
+// frames a second.
+TEST_F(LightDriverTest, TheSameLightAgainIsWrittenAndChangesNoPicture) {
+  exchange.light_lag_ns = 1000;
+  driver.start();
+  const auto since_ns = driver.light_since_ns();
+  ASSERT_TRUE(driver.submit({SetLight{dimmed(200)}}));
+  const auto done = std::get<CommandDone>(next().value());
+  EXPECT_EQ(done.outcome, Outcome::done);
+  EXPECT_EQ(done.light_since_ns, since_ns);
+  EXPECT_EQ(ring.all().size(), 2U);
+  take_notes();
+  EXPECT_EQ(notes.size(), 2U) << "of the start";
+  ring.broken = true;
+  ASSERT_TRUE(driver.submit({SetLight{dimmed(200)}}));
+  EXPECT_EQ(std::get<CommandDone>(next().value()).outcome, Outcome::device_error);
+  take_notes();
+  ASSERT_EQ(notes.size(), 4U) << "half a write may have changed the LEDs";
+  EXPECT_TRUE(notes[2].begins);
+  EXPECT_TRUE(notes[3].failed);
+}
+
 TEST_F(LightDriverTest, AFailureIsAnswerConditionAndSentence) {
   driver.start();
   ring.broken = true;
