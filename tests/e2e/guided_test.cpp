@@ -57,13 +57,6 @@ bool there(const Sensor& sensor, const std::string& name) {
   return fs::exists(sensor.folder.path() / "ball" / name);
 }
 
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-// Programs with sanitizers that share a core cannot process whole pictures faster.
-constexpr unsigned kFps = 20;
-#else
-constexpr unsigned kFps = 60;
-#endif
-
 std::string rate() { return fmt::format("camera.fps={}", kFps); }
 
 /// The presses of calibration_presses.toml, each held as long as the machine needs.

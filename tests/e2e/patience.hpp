@@ -9,4 +9,7 @@ inline constexpr int kSlower = 5;
 inline constexpr int kSlower = 1;
 #endif
 
+/// Frames a second: with sanitizers as many whole pictures as a shared core can process.
+inline constexpr unsigned kFps = kSlower == 1 ? 60 : 20;
+
 }  // namespace dtact::e2e
