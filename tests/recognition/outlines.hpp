@@ -27,7 +27,7 @@ inline double face(double outline, double chamfer) {
 }
 
 template <typename Height>
-hal::sim::Object object(Height height) {
+hal::sim::Object object(const Height& height) {
   return {"", kReach, height};
 }
 

@@ -34,7 +34,7 @@ void add_press(sim::Scene& scene, const sim::Object& object, double depth_mm, do
     return sim::PressKey{.time_s = begin + after, .x_mm = x_mm, .y_mm = y_mm, .depth_mm = depth};
   };
   scene.presses.push_back(
-      {std::move(object), {key(0, 0), key(0.1, depth_mm), key(0.6, depth_mm), key(0.65, 0)}});
+      {object, {key(0, 0), key(0.1, depth_mm), key(0.6, depth_mm), key(0.65, 0)}});
 }
 
 /// The light of a frame: LEDs and gain differ from the calibration's.

@@ -151,7 +151,7 @@ std::string to_markdown(const std::vector<SceneReport>& scenes) {
 
   std::vector<const SceneReport*> worst;
   for (const SceneReport& scene : scenes) worst.push_back(&scene);
-  std::ranges::stable_sort(worst, std::ranges::greater(), &SceneReport::worst_ratio);
+  std::ranges::sort(worst, std::ranges::greater(), &SceneReport::worst_ratio);
   worst.resize(std::min(worst.size(), kWorst));
   fmt::format_to(to,
                  "\n| worst scenes | error / stated | gel, mm | calibrated to, mm | what |\n"

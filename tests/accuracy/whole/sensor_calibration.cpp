@@ -46,7 +46,9 @@ class Bench {
   std::string load(std::size_t index, std::uint64_t count = kImages) {
     return images(fmt::format("load{}", index), frame_of(index), count);
   }
-  double newtons(std::size_t index) const { return renderer_.truth().force_n(frame_of(index)); }
+  [[nodiscard]] double newtons(std::size_t index) const {
+    return renderer_.truth().force_n(frame_of(index));
+  }
 
  private:
   static sim::Scene with(sim::Scene scene, const std::vector<Load>& loads) {
