@@ -42,6 +42,11 @@ std::vector<std::string> at_test_rate(std::vector<std::string> settings) {
   return settings;
 }
 
+/// The daemon's, read where it is built with the address sanitizer.
+Environment sanitizer() {
+  return {{"ASAN_OPTIONS", fmt::format("quarantine_size_mb={}", kQuarantineMib)}};
+}
+
 }  // namespace
 
 Held held_by(pid_t pid) {
@@ -136,7 +141,7 @@ std::string HonestClients::broken() const {
 }
 
 Besieged::Besieged(const std::vector<std::string>& settings)
-    : sensor_(scene(), true, at_test_rate(settings)),
+    : sensor_(scene(), true, at_test_rate(settings), sanitizer()),
       honest_(sensor_.connect("honest"), sensor_.connect("commander")) {}
 
 Besieged::~Besieged() { EXPECT_EQ(sensor_.daemon->stop(SIGTERM), 0) << sensor_.daemon->log(); }

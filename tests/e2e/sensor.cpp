@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <csignal>
 #include <stdexcept>
+#include <utility>
 
 #include "tests/e2e/patience.hpp"
 
@@ -44,7 +45,9 @@ const fs::path& calibration_folder() {
   return made;
 }
 
-Sensor::Sensor(const fs::path& scene, bool calibrated, const std::vector<std::string>& settings) {
+Sensor::Sensor(const fs::path& scene, bool calibrated, const std::vector<std::string>& settings,
+               Environment daemons)
+    : environment(std::move(daemons)) {
   arguments = {"--set", "net.port=0", "--set", "state_dir=" + (folder.path() / "state").string()};
   const auto set = [&](const std::string& setting) {
     arguments.insert(arguments.end(), {"--set", setting});
@@ -53,7 +56,7 @@ Sensor::Sensor(const fs::path& scene, bool calibrated, const std::vector<std::st
   // The simulated sensor's own may be installed on this machine.
   set(calibrated ? "calibration=" + calibration_folder().string() : "camera.sim.calibration=");
   for (const std::string& setting : settings) set(setting);
-  daemon = std::make_unique<DaemonProcess>(arguments);
+  daemon = std::make_unique<DaemonProcess>(arguments, environment);
 }
 
 client::Options Sensor::options() const {
@@ -71,7 +74,7 @@ client::Client Sensor::connect(const std::string& program) const {
 
 void Sensor::restart() {
   if (daemon->stop(SIGTERM) != 0) throw std::runtime_error("the daemon ended badly");
-  daemon = std::make_unique<DaemonProcess>(arguments);
+  daemon = std::make_unique<DaemonProcess>(arguments, environment);
 }
 
 bool read_until(client::Client& client, const std::function<bool(const Item&)>& done,

@@ -30,9 +30,9 @@ std::filesystem::path scene_file(const std::string& name);
 
 /// A daemon on the simulated sensor with a state folder, port and temp files of its own.
 struct Sensor {
-  /// `scene` empty: the built-in one. `settings`: further KEY=VALUE.
+  /// `scene` empty: the built-in one. `settings`: further KEY=VALUE. `environment`: of the daemon.
   explicit Sensor(const std::filesystem::path& scene = {}, bool calibrated = true,
-                  const std::vector<std::string>& settings = {});
+                  const std::vector<std::string>& settings = {}, Environment environment = {});
   Sensor(const Sensor&) = delete;
   Sensor& operator=(const Sensor&) = delete;
 
@@ -44,6 +44,7 @@ struct Sensor {
 
   TempFolder folder;
   std::vector<std::string> arguments;
+  Environment environment;
   std::unique_ptr<DaemonProcess> daemon;
 };
 
