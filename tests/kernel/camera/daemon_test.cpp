@@ -176,8 +176,9 @@ TEST_F(Daemon, FourClientsWatchThroughAnUnplug) {
     }));
     measured("re-plug to frames at four clients", now_s() - begin, "s");
     ASSERT_TRUE(all([](const auto& w) { return w->state() != v1::STATE_CAMERA_LOST; }));
+    // Frames that come late on a busy machine stall it for a moment.
+    ASSERT_TRUE(eventually(kTimeout, [&] { return status().camera().state() == "streaming"; }));
     const v1::Status s = status();
-    EXPECT_EQ(s.camera().state(), "streaming");
     EXPECT_EQ(s.camera().disconnects(), static_cast<std::uint64_t>(cycle + 1));
     for (const auto& control : s.camera().controls()) {
       EXPECT_NE(control.verdict(), v1::CONTROL_VERDICT_REFUSED)
