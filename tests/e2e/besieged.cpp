@@ -42,8 +42,8 @@ std::vector<std::string> at_test_rate(std::vector<std::string> settings) {
   return settings;
 }
 
-/// The daemon's, read where it is built with the address sanitizer.
-Environment sanitizer() {
+/// Environment of the daemon: what the address sanitizer reads where it is built in.
+Environment sanitizer_options() {
   return {{"ASAN_OPTIONS", fmt::format("quarantine_size_mb={}", kQuarantineMib)}};
 }
 
@@ -141,7 +141,7 @@ std::string HonestClients::broken() const {
 }
 
 Besieged::Besieged(const std::vector<std::string>& settings)
-    : sensor_(scene(), true, at_test_rate(settings), sanitizer()),
+    : sensor_(scene(), true, at_test_rate(settings), sanitizer_options()),
       honest_(sensor_.connect("honest"), sensor_.connect("commander")) {}
 
 Besieged::~Besieged() { EXPECT_EQ(sensor_.daemon->stop(SIGTERM), 0) << sensor_.daemon->log(); }

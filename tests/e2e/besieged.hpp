@@ -13,20 +13,19 @@
 
 namespace dtact::e2e {
 
+/// Freed memory that the address sanitizer keeps to detect its use (quarantine_size_mb). Its
+/// default of 256 MiB would hide what the daemon holds.
+inline constexpr int kQuarantineMib = 16;
+
 /// Limits of growth after an attack, where nothing may be held, and of what is held at any time.
 #if defined(__SANITIZE_ADDRESS__)
-/// Freed memory that the sanitizer keeps to detect its use. Its usual 256 MiB would hide what the
-/// daemon holds.
-inline constexpr int kQuarantineMib = 16;
 inline constexpr std::int64_t kMemorySlackKib = (kQuarantineMib + 8) * 1024;
 inline constexpr std::int64_t kMaxResidentKib = 1024 * 1024;
 #elif defined(__SANITIZE_THREAD__)
-// The sanitizer's notes on memory stay where that was given back.
-inline constexpr int kQuarantineMib = 0;
+// Shadow memory stays resident where the memory itself was given back.
 inline constexpr std::int64_t kMemorySlackKib = (256 + 8) * 1024;
 inline constexpr std::int64_t kMaxResidentKib = 1024 * 1024;
 #else
-inline constexpr int kQuarantineMib = 0;
 inline constexpr std::int64_t kMemorySlackKib = 8 * 1024;
 inline constexpr std::int64_t kMaxResidentKib = 150 * 1024;
 #endif

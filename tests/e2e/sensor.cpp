@@ -46,8 +46,8 @@ const fs::path& calibration_folder() {
 }
 
 Sensor::Sensor(const fs::path& scene, bool calibrated, const std::vector<std::string>& settings,
-               Environment daemons)
-    : environment(std::move(daemons)) {
+               Environment daemon_environment)
+    : environment(std::move(daemon_environment)) {
   arguments = {"--set", "net.port=0", "--set", "state_dir=" + (folder.path() / "state").string()};
   const auto set = [&](const std::string& setting) {
     arguments.insert(arguments.end(), {"--set", setting});
