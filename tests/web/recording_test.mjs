@@ -295,13 +295,15 @@ test("the difference is taken from the reference of the frame that is shown", as
   assert.ok(Math.abs(greys[0] - greys[1]) > 20, greys.join());
   const player = await play(file);
   await player.getByRole("radio", { name: "Difference" }).click();
-  const box = await player.locator("canvas.marks").boundingBox();
-  await view.page.mouse.move(
-    box.x + ((column + 0.5) / width) * box.width,
-    box.y + ((row + 0.5) / height) * box.height,
-  );
-  const reference = async () =>
-    Number(/reference (\d+) ·/.exec(await player.locator(".readout").textContent())?.[1]);
+  const marks = player.locator("canvas.marks");
+  // Points anew each time: the canvas takes its size with the first picture, and may lie below the window.
+  const reference = async () => {
+    await marks.waitFor();
+    const box = await marks.boundingBox();
+    const position = { x: ((column + 0.5) / width) * box.width, y: ((row + 0.5) / height) * box.height };
+    await marks.hover({ position });
+    return Number(/reference (\d+) ·/.exec(await player.locator(".readout").textContent())?.[1]);
+  };
   await until(reference, (grey) => Math.abs(grey - greys[1]) <= 2);
   await until(
     () => player.getByRole("button", { name: "Resume" }).count(),
