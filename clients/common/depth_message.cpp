@@ -36,16 +36,19 @@ Kind kind_of(v1::Surface::Shape shape) {
 /// False for NaN.
 bool within(double value, double low, double high) { return value >= low && value <= high; }
 
-/// Whether the map lies in its whole, which is no larger than a daemon's.
-bool is_placed(const v1::DepthMap& map) {
+/// Throws ProtocolError unless the map lies in its whole, which is no larger than a daemon's, and
+/// its scales are those that a calibration can have.
+void require_possible(const v1::DepthMap& map) {
   const std::uint64_t full_width = map.full_width();
   const std::uint64_t full_height = map.full_height();
-  return std::uint64_t{map.x()} + map.width() <= full_width &&
-         std::uint64_t{map.y()} + map.height() <= full_height &&
-         full_width * full_height <= std::uint64_t{recon::kMaxMapPixels};
-}
-
-[[noreturn]] void refuse(const v1::DepthMap& map) {
+  const bool placed = std::uint64_t{map.x()} + map.width() <= full_width &&
+                      std::uint64_t{map.y()} + map.height() <= full_height &&
+                      full_width * full_height <= std::uint64_t{recon::kMaxMapPixels};
+  // A calibration has 0.0001 to 10 mm a pixel.
+  constexpr std::uint32_t kMaxDecimation = 64;
+  const bool scaled = within(map.mm_per_px(), 1e-4, 10.0 * kMaxDecimation) &&
+                      within(map.um_per_unit(), 1e-3, 1e3) && map.decimation() <= kMaxDecimation;
+  if (placed && scaled) return;
   throw client::ProtocolError(
       fmt::format("a depth map of {}x{} pixels at {}, {} of {}x{}, {} mm a pixel, {} um a unit and "
                   "decimation {} contradicts itself: install the same release on both sides",
@@ -104,11 +107,7 @@ void set_surface(const recon::Surface& surface, v1::Frame& frame) {
 }
 
 std::vector<std::int16_t> depths_of(const v1::DepthMap& map) {
-  // A calibration has 0.0001 to 10 mm a pixel.
-  constexpr std::uint32_t kMaxDecimation = 64;
-  const bool scaled = within(map.mm_per_px(), 1e-4, 10.0 * kMaxDecimation) &&
-                      within(map.um_per_unit(), 1e-3, 1e3) && map.decimation() <= kMaxDecimation;
-  if (!is_placed(map) || !scaled) refuse(map);
+  require_possible(map);
   return client::values_of(map);
 }
 
@@ -127,7 +126,7 @@ perceive::DepthGrid grid_of(const v1::DepthMap& map, std::span<const std::int16_
 
 DepthImage depth_image(const v1::Frame& frame, std::span<const float> mm) {
   const v1::DepthMap& map = frame.depth();
-  if (!is_placed(map)) refuse(map);
+  require_possible(map);
   return {.width = static_cast<int>(map.width()),
           .height = static_cast<int>(map.height()),
           .mm_per_px = map.mm_per_px(),

@@ -69,6 +69,7 @@ v1::Frame frame_of(const v1::Surface& surface) {
   map.set_full_width(9);
   map.set_full_height(8);
   map.set_mm_per_px(1);
+  map.set_um_per_unit(1);
   return frame;
 }
 
@@ -93,6 +94,16 @@ TEST(DepthImage, RefusesAMapBesideItsWhole) {
   v1::Frame frame = frame_of({});
   frame.mutable_depth()->set_x(7);
   EXPECT_THROW((void)depth_image(frame, {}), client::ProtocolError);
+}
+
+// Before: an export as a point cloud looked for a pixel's neighbours over 10⁸ pixels.
+TEST(DepthImage, RefusesAScaleThatNoCalibrationHas) {
+  for (const double mm_per_px : {1e-9, 0.0, 1e9, std::numeric_limits<double>::quiet_NaN()}) {
+    v1::Frame frame = frame_of({});
+    frame.mutable_depth()->set_mm_per_px(mm_per_px);
+    EXPECT_THAT([&] { (void)depth_image(frame, {}); },
+                ThrowsMessage<client::ProtocolError>(HasSubstr("mm a pixel")));
+  }
 }
 
 }  // namespace
