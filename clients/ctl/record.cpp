@@ -99,7 +99,7 @@ class Recording {
     cli::RecordReport report;
     report.set_file(options_.output);
     report.set_frames(counts.frames);
-    report.set_missed(seen_ == 0 ? 0 : last_ - first_ + 1 - counts.frames);
+    report.set_missed(skipped_ + seen_ - counts.frames);
     report.set_dropped(counts.dropped);
     report.set_bytes(counts.bytes);
     report.set_seconds(std::chrono::duration<double>(Clock::now() - began_).count());
@@ -117,8 +117,10 @@ class Recording {
       return;
     }
     auto& frame = std::get<v1::Frame>(item);  // it is never asked to connect again
+    // Behind dtact-perceive a daemon that restarts begins anew.
+    const bool goes_on = seen_ > 0 && frame.sequence() > last_;
+    if (goes_on) skipped_ += frame.sequence() - last_ - 1;
     last_ = frame.sequence();
-    if (seen_ == 0) first_ = last_;
     recorder_.add(std::move(frame));
     if (seen_++ > 0) return;
     recorder_.add(status);
@@ -170,8 +172,8 @@ class Recording {
   Clock::time_point began_ = Clock::now();
   std::map<std::string, mcap::Attachment> files_;  // that wait for the first frame
   std::uint64_t seen_ = 0;
-  std::uint64_t first_ = 0;  // sequences
-  std::uint64_t last_ = 0;
+  std::uint64_t last_ = 0;     // sequence
+  std::uint64_t skipped_ = 0;  // frames between those that came
 };
 
 void print(const Context& context, const cli::RecordReport& report) {
