@@ -411,7 +411,12 @@ class Setup {
     Command command = {cli::sibling("dtactctl")};
     add_target(command);
     const bool terminal = &context_.out == &std::cout && ::isatty(STDOUT_FILENO) == 1;
-    command.insert(command.end(), {"watch", terminal ? "--draw" : "--seconds=5"});
+    command.emplace_back("watch");
+    if (terminal) {
+      command.emplace_back("--draw");
+    } else {
+      command.insert(command.end(), {"--seconds=5", "--min-fps=0.5"});
+    }
     if (run_program(command, context_.out) != 0) stop("no depth came: dtactctl status says why");
   }
 
