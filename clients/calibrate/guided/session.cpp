@@ -177,7 +177,9 @@ std::string Session::ask(const Prompt& prompt) {
 }
 
 void Session::reference_step() {
-  capture_->expect_light({});
+  // Presses that stay are of the camera's settings and light of the reference before.
+  const bool presses_stay = !images_.set.presses.empty();
+  if (!presses_stay) capture_->expect_light({});
   for (;;) {
     (void)ask(
         {"Take your hands off: nothing may touch the surface.", {{"", "take the images"}, kQuit}});
@@ -188,6 +190,7 @@ void Session::reference_step() {
       const v1::Status status = steady_status();
       const std::string wrong = unfit(status);
       if (!wrong.empty()) throw CaptureTimeout("not taken: " + wrong);
+      if (presses_stay) require_same_sensor();
       folder_.save_reference(still.frames, origin_of(status));
       console_.say(
           fmt::format("reference taken: {} frames, steady within {:.2f} grey levels, noise {:.1f}",

@@ -237,6 +237,24 @@ TEST(Capture, WhatCreepsIsNoStillPicture) {
   EXPECT_THROW((void)capture.reference(90), CaptureTimeout);
 }
 
+// There was contact at the first reference, and the camera is set to another exposure before the
+// second. Before: the press stayed, and was compared with a reference of another brightness.
+TEST_F(GuidedSession, AReferenceThatIsRetakenIsOfTheSameSettings) {
+  FakeSensor sensor({{.depth_mm = 0.4, .x_px = 130, .y_px = 110, .frames = 40},
+                     {.depth_mm = 1.3, .x_px = 190, .y_px = 180},
+                     kContactFree});
+  FakeConsole console({"", "", "", ""});
+  sensor.on_status = [&](v1::Status& now) {
+    if (console.said.find("has to be taken again") != std::string::npos)
+      now.mutable_camera()->mutable_controls(0)->set_value(50);
+  };
+  EXPECT_THAT([&] { (void)run(sensor, console); },
+              ThrowsMessage<std::runtime_error>(
+                  AllOf(HasSubstr("the sensor changed: "), HasSubstr("begin again in another"))));
+  EXPECT_THAT(console.said, HasSubstr("press-01 taken"));
+  EXPECT_EQ(recorded_origin({(plan_.folder / "reference").string()}).controls.at(0).value, 100);
+}
+
 TEST_F(GuidedSession, APersonMayTakeWhatDoesNotHoldStill) {
   FakeSensor sensor({kContactFree, {.depth_mm = 0.5, .frames = 1000, .step_mm = 0.001}});
   FakeConsole console({"", "~25", "", "~3", "", "~50", "q"});
@@ -253,6 +271,15 @@ TEST_F(GuidedSession, OnlyEnterTakesWhatDoesNotHoldStill) {
   EXPECT_EQ(run(sensor, console), Outcome::unfinished);
   EXPECT_THAT(console.said,
               AllOf(HasSubstr("\"s\" means nothing here"), Not(HasSubstr("press-01 taken"))));
+}
+
+// Enter before the contact: that was not meant for the press that follows.
+TEST_F(GuidedSession, AnEarlyEnterDoesNotTakeAMovingPress) {
+  FakeSensor sensor({kContactFree, {.depth_mm = 0.5, .frames = 1000, .step_mm = 0.02}});
+  FakeConsole console({"", "", "", "~60", "q"});
+  console.person = true;
+  EXPECT_EQ(run(sensor, console), Outcome::unfinished);
+  EXPECT_THAT(console.said, Not(HasSubstr("press-01 taken")));
 }
 
 // Its contact leaves the map.
