@@ -49,7 +49,9 @@ std::vector<Knot> sag_by_level(const DarkeningMap& map, const Contact& contact,
     for (int x = 0; x < map.width; ++x) {
       const double r = distance_mm(map, contact, x, y);
       const double level = map.at(x, y);
-      if (r >= reach_mm || !(level >= 0) || (use && !use(x, y))) continue;
+      // A press's own gain may raise a level above all that a picture can have.
+      const bool in_range = level >= 0 && level < static_cast<double>(kRange);
+      if (r >= reach_mm || !in_range || (use && !use(x, y))) continue;
       Knot& bin = bins[static_cast<std::size_t>(level * per_level)];
       bin.level += level;
       bin.depth_mm += sag_mm(contact.ball_radius_mm, r);
