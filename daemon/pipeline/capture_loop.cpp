@@ -216,7 +216,9 @@ void CaptureLoop::without_frame(hal::GrabStatus status, std::int64_t asked_ns,
                                 std::int64_t now_ns) noexcept {
   watch_.missed(status, now_ns);
   exchange_.camera_damaged.store(watch_.damaged(), std::memory_order_relaxed);
-  if (watch_.away() || watch_.silent_ns(now_ns) > kSecond) executor_.abort_rezero();
+  // A slow camera is silent for longer between two frames.
+  const std::int64_t silence_ns = std::max(kSecond, hal::stall_ns(period_ns_));
+  if (watch_.away() || watch_.silent_ns(now_ns) > silence_ns) executor_.abort_rezero();
   emit(health(now_ns), now_ns);
   reporter_.flush();
   // A camera that fails at once is not retried at once, unless it had a frame.

@@ -267,6 +267,28 @@ TEST(CaptureLoop, ARezeroOfACameraThatWentAwayIsGivenUp) {
   EXPECT_NEAR(loop.frame->contact.deepest_mm, 1, 0.05) << "an image with contact is no reference";
 }
 
+// Two seconds between two frames. Before: a second of silence was the camera's end, and no re-zero
+// succeeded.
+TEST(CaptureLoop, ARezeroWaitsForTheFramesOfASlowCamera) {
+  SteppedLoop loop(0.5);
+  loop.camera.slower = 0.05;  // a grab waits for a tenth of a second
+  const auto next_frame = [&] {
+    loop.camera.status = hal::GrabStatus::timeout;
+    loop.step(19);
+    loop.camera.status = hal::GrabStatus::ok;
+    (void)loop.step();
+  };
+  loop.begin(toy_calibration());
+  for (int i = 0; i < 60; ++i) next_frame();
+  ASSERT_TRUE(loop.frame->has_depth && loop.frame->health.empty());
+  ASSERT_TRUE(loop.submit(Rezero{true}));
+  for (int i = 0; i < 60; ++i) next_frame();
+  const auto answers = loop.all<CommandDone>();
+  ASSERT_EQ(answers.size(), 1U);
+  EXPECT_TRUE(std::holds_alternative<Rezero>(answers[0].command.what));
+  EXPECT_EQ(answers[0].outcome, Outcome::done);
+}
+
 TEST(CaptureLoop, MakesNoDepthThatNobodyListensTo) {
   SteppedLoop loop;
   loop.exchange.wanted = Wanted{};
