@@ -26,10 +26,13 @@ HealthLog::HealthLog(pipeline::HealthSet reported) {
 
 std::vector<HealthLog::Line> HealthLog::step(const pipeline::Status& status, Time now) {
   std::vector<Line> lines;
+  if (began_ == Time::min()) began_ = now;
   for (int i = 0; i < pipeline::kHealthCount; ++i) {
     const auto health = static_cast<Health>(i);
     Flag& flag = health_flags_.at(static_cast<std::size_t>(i));
     const bool on = status.health.has(health);
+    // What was wrong at the start, and was right before the first look.
+    if (!on && now - began_ > kPause) flag.known = false;
     if (on && !flag.on) {
       if (std::exchange(flag.known, false)) {
         flag.reported = true;

@@ -30,13 +30,14 @@ class HealthLog {
 
  private:
   struct Flag {
-    bool known = false;  ///< The log has announced its start.
+    bool known = false;  ///< The log has announced its start, less than kPause ago.
     bool on = false;
     bool reported = false;  ///< Its start has been logged, its end not yet.
     unsigned times = 0;     ///< Starts since the last line.
     Time last = Time::min();
   };
   std::array<Flag, pipeline::kHealthCount> health_flags_{};
+  Time began_ = Time::min();  ///< The first step.
 };
 
 }  // namespace dtact::app

@@ -84,6 +84,13 @@ TEST_F(HealthFlags, WhatTheStartHasReportedIsNotReportedAgain) {
   EXPECT_THAT(after(1s, with({Health::uncalibrated})), ElementsAre(StartsWith("uncalibrated: ")));
 }
 
+// What the start has reported was right before the first look, and comes much later.
+TEST_F(HealthFlags, WhatTheStartHasReportedCountsForTheStart) {
+  EXPECT_THAT(after(1s, with({})), IsEmpty());
+  EXPECT_THAT(after(61s, with({})), IsEmpty());
+  EXPECT_THAT(after(1s, with({Health::uncalibrated})), ElementsAre(StartsWith("uncalibrated: ")));
+}
+
 TEST_F(HealthFlags, TheUsualStepsOfAStartAreNoWarnings) {
   const auto lines = log_.step(with({Health::starting}), now_);
   ASSERT_EQ(lines.size(), 1U);
