@@ -117,7 +117,10 @@ void Hub::on_frame(const pipeline::DepthFrame& frame) {
     auto encoded = encoder_.encode(*kind);
     if (encoded != nullptr) {
       session->send_frame(std::move(encoded));
-    } else if (!std::exchange(reported_too_large_, true)) {
+      continue;
+    }
+    session->count_dropped();
+    if (!std::exchange(reported_too_large_, true)) {
       config_.log({LogLevel::warning,
                    "a frame is above the wire's cap and is not sent: subscribe to depth or luma "
                    "alone, or choose a smaller camera mode"});
@@ -150,6 +153,7 @@ void Hub::update_want() {
   }
   port_.want(wanted);
   encoder_.forget();
+  reported_too_large_ = false;
 }
 
 Traffic Hub::traffic() const {

@@ -63,6 +63,8 @@ class Session : public std::enable_shared_from_this<Session>, private Outbox::Ow
   void reply_error(std::uint64_t id, int error_code, const std::string& sentence);
   /// A frame of this client's kind.
   void send_frame(std::shared_ptr<const EncodedFrame> frame);
+  /// A frame that was due cannot be sent.
+  void count_dropped() noexcept { outbox_.count_dropped(1); }
   /// One more frame came out of the pipeline, after `missed` unfetched ones. Returns the kind that
   /// this client gets of it, if any, including what it replaces: parts of the previous frame that
   /// still wait to be sent.

@@ -229,6 +229,12 @@ TEST(Stream, SaysOnceThatFramesAreTooLarge) {
   const std::size_t reported = log.find("above the wire's cap");
   ASSERT_NE(reported, std::string::npos);
   EXPECT_EQ(log.find("above the wire's cap", reported + 1), std::string::npos);
+  v1::ClientMessage status;
+  status.mutable_get_status();
+  const v1::Status now = client.request(status).status();
+  ASSERT_EQ(now.clients_size(), 2);
+  EXPECT_EQ(now.clients(0).dropped(), 3U);
+  EXPECT_EQ(now.clients(1).dropped(), 0U);
 }
 
 TEST(Stream, EncodesOnceForEachDistinctChoice) {
