@@ -13,13 +13,15 @@ WireTransport::WireTransport(std::shared_ptr<WebSocket> socket, net::Peer peer,
     : Transport(std::move(peer)), socket_(std::move(socket)), place_(std::move(place)) {}
 
 void WireTransport::send_text(std::string text) {
-  text_ = std::move(text);
+  texts_.push_back(std::move(text));
+  if (texts_.size() > 2) texts_.pop_front();
   if (!writing_) write_text();
 }
 
 void WireTransport::write_text() {
   writing_ = true;
-  const auto text = std::make_shared<const std::string>(std::exchange(text_, {}).value_or(""));
+  const auto text = std::make_shared<const std::string>(std::move(texts_.front()));
+  texts_.pop_front();
   // No one else waits for this write, so it owns what it needs.
   socket_->write(
       {asio::buffer(*text)}, true,
@@ -30,7 +32,7 @@ void WireTransport::write_text() {
         transport.writing_ = false;
         // What an error means the next write or read finds out.
         if (auto next = std::exchange(transport.next_, nullptr)) return next();
-        if (transport.text_) transport.write_text();
+        if (!transport.texts_.empty()) transport.write_text();
       });
 }
 
@@ -50,7 +52,7 @@ void WireTransport::write(const Parts& parts, Done done) {
   socket_->write(parts, false,
                  [this, done = std::move(done)](const error_code& error, std::size_t size) {
                    writing_ = false;
-                   if (text_ && !error) write_text();
+                   if (!texts_.empty() && !error) write_text();
                    done(error, size);
                  });
 }

@@ -1,8 +1,8 @@
 #pragma once
 
+#include <deque>
 #include <functional>
 #include <memory>
-#include <optional>
 #include <string>
 
 #include "clients/web/web_socket.hpp"
@@ -11,13 +11,14 @@
 namespace dtact::web {
 
 /// The daemon's wire in a WebSocket's binary messages, and text messages of the gateway's own
-/// beside it, of which the newest is sent.
+/// beside it, of which the newest two are sent.
 class WireTransport : public net::Transport {
  public:
   /// `place`: see Upgrade::open.
   WireTransport(std::shared_ptr<WebSocket> socket, net::Peer peer, std::shared_ptr<void> place);
 
-  /// Sends a text as soon as what is being written is through, in place of one that waits.
+  /// Sends a text as soon as what is being written is through. Of those that wait the last two
+  /// stay: a page that is told only of the end of a loss would not subscribe again.
   void send_text(std::string text);
 
   void on_authenticated() override { place_.reset(); }
@@ -34,8 +35,8 @@ class WireTransport : public net::Transport {
   std::shared_ptr<WebSocket> socket_;  ///< Shared with a text on its way.
   std::shared_ptr<void> place_;
   bool writing_ = false;
-  std::optional<std::string> text_;  ///< Waits.
-  std::function<void()> next_;       ///< What came while a text was being written.
+  std::deque<std::string> texts_;  ///< Wait.
+  std::function<void()> next_;     ///< What came while a text was being written.
   std::shared_ptr<WireTransport*> self_ = std::make_shared<WireTransport*>(this);
 };
 
