@@ -62,7 +62,7 @@ void SensorTopics::update() {
           return;
         }
         refused_ = true;
-        asked_.clear();
+        asked_.reset();
         ask_again_later();
         publish_state(false, reply.error().message());
       },
@@ -78,7 +78,7 @@ void SensorTopics::ask_again_later() {
 }
 
 void SensorTopics::on_changed() {
-  asked_.clear();
+  asked_.reset();
   light_.reset();
   const bool well = source_->connected();
   publish_state(

@@ -4,6 +4,7 @@
 #include <boost/asio/steady_timer.hpp>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "clients/web/foxglove/topics.hpp"
@@ -53,7 +54,8 @@ class SensorTopics : public std::enable_shared_from_this<SensorTopics> {
 
   std::shared_ptr<Source> source_;
   std::map<Listener*, Topics> listeners_;
-  std::string asked_;     ///< The Subscribe that the daemon knows, serialized.
+  /// The Subscribe that the daemon knows, serialized; none: not known.
+  std::optional<std::string> asked_ = "";
   bool refused_ = false;  ///< The last one was.
   boost::asio::steady_timer retry_;
   std::shared_ptr<const Message> light_;

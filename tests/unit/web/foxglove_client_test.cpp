@@ -10,6 +10,7 @@
 #include <boost/asio/executor_work_guard.hpp>
 #include <boost/asio/io_context.hpp>
 #include <chrono>
+#include <functional>
 #include <future>
 #include <memory>
 #include <string>
@@ -153,6 +154,62 @@ TEST(FoxgloveClient, SubscriptionsEndWithTheirChannels) {
   EXPECT_EQ(wanted.depth(), v1::DEPTH_NONE);
   EXPECT_TRUE(wanted.summary());
   client->close("over");
+  sensor->stop();
+  source->stop();
+}
+
+class NewestState : public SensorTopics::Listener {
+ public:
+  void on_message(const SensorTopics&, Topic, const std::shared_ptr<const Message>&) override {}
+  void on_state(const SensorTopics&, bool well, const std::string& sentence) override {
+    well_ = well;
+    sentence_ = sentence;
+  }
+  bool well_ = false;
+  std::string sentence_;
+};
+
+// The daemon is full when a second topic is asked for. Before: once its client had left, the stream
+// of the first one went on for nobody.
+TEST(SensorTopics, EndAStreamThatARefusalHasLeft) {
+  base::UniqueFd listening = client::test::listen_on();
+  const int fd = listening.get();
+  std::promise<void> ended;
+  client::test::PlayedDaemon daemon({[&](client::test::Peer& peer) {
+                                      peer.greet();
+                                      client::test::Peer first(fd, nullptr);
+                                      first.greet();
+                                      first.done();
+                                      client::test::Peer second(fd, nullptr);
+                                      second.greet();
+                                      second.refuse(v1::ERROR_BUSY, "all places are taken");
+                                      if (first.ends_silently()) ended.set_value();
+                                      (void)peer.ends_silently();
+                                    }},
+                                    std::move(listening));
+  asio::io_context io;
+  const auto work = asio::make_work_guard(io);
+  const auto end = std::chrono::steady_clock::now() + client::test::kLong;
+  const auto run_until = [&](const std::function<bool()>& done) {
+    while (!done() && std::chrono::steady_clock::now() < end) {
+      io.run_for(std::chrono::milliseconds(10));
+    }
+    return done();
+  };
+  const auto source = std::make_shared<Source>(io, "left", daemon.options);
+  const auto sensor = std::make_shared<SensorTopics>(source);
+  NewestState state;
+  sensor->start();
+  source->start();
+  Topics wanted;
+  sensor->want(state, wanted.set(index(Topic::contact)));
+  ASSERT_TRUE(run_until([&] { return state.well_; }));
+  sensor->want(state, wanted.set(index(Topic::depth)));
+  ASSERT_TRUE(run_until([&] { return state.sentence_ == "all places are taken"; }));
+  sensor->forget(state);
+  const std::future<void> left = ended.get_future();
+  EXPECT_TRUE(run_until(
+      [&] { return left.wait_for(std::chrono::seconds(0)) == std::future_status::ready; }));
   sensor->stop();
   source->stop();
 }
