@@ -117,6 +117,19 @@ class Reading(unittest.TestCase):
         with self.assertRaisesRegex(ValueError, "it gives 2 × 2, 1 × 1"):
             dtact.Camera(self.daemon.address, width=3, height=2).connect()
 
+    def test_of_auto_it_takes_what_always_comes(self):
+        # Before: the full size was promised, and arrays of a quarter of it came.
+        def status(request, reply):
+            reply.status.state, reply.status.camera.fps = 3, 60
+            reply.status.calibration.width, reply.status.calibration.height = 16, 8
+            reply.status.reconstruction.resolution = "auto"
+        self.daemon.answers["get_status"] = status
+        camera = self.camera()
+        self.assertEqual((camera.width, camera.height), (4, 2))
+        self.assertEqual(self.daemon.requests[-1].subscribe.decimation, 4)
+        with self.assertRaisesRegex(ValueError, "16 × 8 is no size of this daemon's depth: it gives 4 × 2"):
+            dtact.Camera(self.daemon.address, width=16, height=8).connect()
+
     def test_a_rate_that_the_daemon_does_not_give(self):
         with self.assertRaisesRegex(ValueError, "100 frames a second were asked for, and the daemon's "
                                     "camera delivers 60"):

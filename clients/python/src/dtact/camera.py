@@ -47,10 +47,10 @@ def colour(depth_mm: NDArray[np.float32]) -> NDArray[np.uint8]:
 
 
 def _finest(status: Status) -> int:
-    """By what the finest depth map is smaller than the calibration's: reconstruction.resolution and
-    camera.decode_scale."""
+    """By what the finest depth map that always comes is smaller than the calibration's:
+    reconstruction.resolution, whose "auto" is a quarter now and then, and camera.decode_scale."""
     size, camera = status.calibration, status.message.camera
-    finest = {"half": 2, "quarter": 4}.get(status.message.reconstruction.resolution, 1)
+    finest = {"half": 2, "quarter": 4, "auto": 4}.get(status.message.reconstruction.resolution, 1)
     if size and size.frame_width and camera.width:
         finest = max(finest, size.frame_width // camera.width)
     return finest
