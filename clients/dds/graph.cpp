@@ -79,7 +79,7 @@ void shut_out_the_network() {
 
 QosPointer qos_of(Qos kind) {
   QosPointer qos(dds_create_qos(), &dds_delete_qos);
-  dds_qset_history(qos.get(), DDS_HISTORY_KEEP_LAST, kind == Qos::command ? 10 : 1);
+  dds_qset_history(qos.get(), DDS_HISTORY_KEEP_LAST, Graph::depth(kind));
   dds_qset_reliability(qos.get(), DDS_RELIABILITY_RELIABLE, 0);
   dds_qset_durability(
       qos.get(), kind == Qos::latched ? DDS_DURABILITY_TRANSIENT_LOCAL : DDS_DURABILITY_VOLATILE);

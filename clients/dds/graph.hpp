@@ -47,6 +47,9 @@ class Graph {
     std::size_t node;
   };
 
+  /// Messages that a writer keeps for each reader.
+  [[nodiscard]] static constexpr int depth(Qos kind) { return kind == Qos::command ? 10 : 1; }
+
   explicit Graph(const Config& config);
   ~Graph();
   Graph(const Graph&) = delete;

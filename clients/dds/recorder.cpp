@@ -26,12 +26,32 @@ std::string ros_name(std::string name) {
   return name;
 }
 
+/// What a writer offers, as rosbag2 notes it up to version 8 of its metadata: rmw's numbers, in
+/// YAML. `ros2 bag play` offers the same; a listener of /tf_static takes nothing that is not
+/// latched.
+std::string offered(Qos kind) {
+  constexpr const char* kNever = "{sec: 9223372036, nsec: 854775807}";
+  return fmt::format(
+      "- history: 1\n"  // keep last
+      "  depth: {}\n"
+      "  reliability: 1\n"  // reliable
+      "  durability: {}\n"  // 1: transient local, 2: volatile
+      "  deadline: {}\n"
+      "  lifespan: {}\n"
+      "  liveliness: 1\n"  // automatic
+      "  liveliness_lease_duration: {}\n"
+      "  avoid_ros_namespace_conventions: false\n",
+      Graph::depth(kind), kind == Qos::latched ? 1 : 2, kNever, kNever, kNever);
+}
+
 }  // namespace
 
 Recorder::Recorder(Graph& graph, const std::string& file, bool replace)
     : sink_(file, replace),
       writer_(sink_, {.library = "dtact-dds " DTACT_VERSION, .profile = "ros2"}),
       waitset_(graph.make_waitset()) {
+  // Without metadata of its own in it, rosbag2 takes the file for one of version 8.
+  writer_.add(mcap::Metadata{"rosbag2", {{"serialized_metadata", ""}}});
   std::map<std::string, std::uint16_t> schemas;
   for (const Graph::Published& one : graph.published()) {
     if (one.topic.ends_with("/result")) continue;
@@ -43,9 +63,10 @@ Recorder::Recorder(Graph& graph, const std::string& file, bool replace)
       schema = writer_.add_schema(ros_name(type->name), "ros2msg", type->definition);
     }
     const dds_entity_t reader = graph.subscribe(one, waitset_);
-    channels_[reader] = {
-        writer_.add_channel(schema, one.topic, "cdr", {{"topic_type_hash", type->hash}}),
-        one.topic != "/tf_static" && one.topic != "/diagnostics"};
+    channels_[reader] = {writer_.add_channel(schema, one.topic, "cdr",
+                                             {{"offered_qos_profiles", offered(one.qos)},
+                                              {"topic_type_hash", type->hash}}),
+                         one.topic != "/tf_static" && one.topic != "/diagnostics"};
   }
   thread_ = std::thread([this] { run(); });
 }

@@ -17,6 +17,8 @@ const reader = await McapIndexedReader.Initialize({
   decompressHandlers: { zstd: (bytes, size) => decompress(bytes, new Uint8Array(Number(size))) },
 });
 const readers = new Map();
+let rosbag2;
+for await (const { name, metadata } of reader.readMetadata()) rosbag2 = { name, ...Object.fromEntries(metadata) };
 for await (const message of reader.readMessages()) {
   const channel = reader.channelsById.get(message.channelId);
   const schema = reader.schemasById.get(channel.schemaId);
@@ -26,6 +28,6 @@ for await (const message of reader.readMessages()) {
   const { data, ...content } = readers.get(channel.id).readMessage(message.data);
   console.log(JSON.stringify({
     profile: reader.header.profile, topic: channel.topic, encoding: channel.messageEncoding, type: schema.name,
-    bytes: data?.byteLength, content,
+    bytes: data?.byteLength, content, qos: channel.metadata.get("offered_qos_profiles"), rosbag2,
   }, (_, value) => (typeof value === "bigint" ? Number(value) : value)));
 }
