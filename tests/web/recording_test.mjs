@@ -342,9 +342,10 @@ test("one that is paused while it is opened shows its first frame, and plays fro
 });
 
 /** A recording of another program: `fill` is given its writer. */
-async function made(fill) {
+async function made(fill, options = {}) {
   const parts = [];
   const writer = new McapWriter({
+    ...options,
     writable: {
       write: async (part) => void parts.push(Buffer.from(part)),
       position: () => BigInt(Buffer.concat(parts).length),
@@ -355,6 +356,55 @@ async function made(fill) {
   await writer.end();
   return Buffer.concat(parts);
 }
+
+// Before: the part that follows a damaged one, which begins within the same frame, was skipped with it.
+test("what stands on both sides of a damaged part is shown", async () => {
+  const recorded = await record(() => pane.getByRole("button", { name: "Stop" }).click());
+  const one = (topic) => Buffer.from(messagesOf(recorded, topic).at(-1).data);
+  const frame = one("/dtact/frame");
+  const jpeg = one("/camera/jpeg");
+  // Fields at the end: a sequence of two bytes, and one that nobody knows.
+  const numbered = (sequence) => Buffer.concat([frame, Buffer.from([0x08, 0x80 | (sequence & 0x7f), sequence >> 7])]);
+  const size = 3 * frame.length;
+  const padded = (value) =>
+    Buffer.concat([jpeg, Buffer.from([0xfa, 0x7f, 0x80 | (size & 0x7f), 0x80 | ((size >> 7) & 0x7f), size >> 14]), Buffer.alloc(size, value)]);
+  const [first, last] = [201, 210];
+  // Parts of 201, 202 and the picture of 203; from there to the picture of 206; to that of 209; and the rest.
+  const chunkSize = Math.round(2.5 * padded(0).length + 2 * frame.length);
+  const bytes = await made(async (writer) => {
+    const register = async (name, topic) => {
+      const schemaId = await writer.registerSchema({ name, encoding: "protobuf", data: new Uint8Array() });
+      return writer.registerChannel({ schemaId, topic, messageEncoding: "protobuf", metadata: new Map() });
+    };
+    const pictures = await register("foxglove.CompressedImage", "/camera/jpeg");
+    const frames = await register("dtact.v1.Frame", "/dtact/frame");
+    for (let sequence = first; sequence <= last; ++sequence) {
+      const time = BigInt(sequence) * 20_000_000n;
+      const message = { sequence, logTime: time, publishTime: time };
+      await writer.addMessage({ ...message, channelId: pictures, data: padded(sequence) });
+      await writer.addMessage({ ...message, channelId: frames, data: numbered(sequence) });
+    }
+  }, { chunkSize });
+  const damage = bytes.indexOf(Buffer.alloc(100, 204));
+  assert.ok(damage > 0);
+  bytes[damage] ^= 1;
+  const file = path.join(work, "boundary.mcap");
+  writeFileSync(file, bytes);
+  const player = await play(file);
+  await until(
+    () => player.getByRole("button", { name: "Resume" }).count(),
+    (count) => count === 1,
+  );
+  const shown = async () => Number(await player.getAttribute("data-sequence"));
+  await until(shown, (sequence) => sequence === last);
+  const step = async (name, sequence) => {
+    await player.getByRole("button", { name }).click();
+    await until(shown, (now) => now === sequence, 20_000);
+  };
+  for (const sequence of [209, 208, 207, 206, 202, 201]) await step("One frame back", sequence);
+  for (const sequence of [202, 206, 207]) await step("One frame on", sequence);
+  await close(player);
+});
 
 test("of a damaged recording the rest plays; what is none says what is wrong", async () => {
   const whole = readFileSync(path.join(work, "ctl.mcap"));

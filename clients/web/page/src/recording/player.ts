@@ -37,6 +37,7 @@ export interface Played {
 }
 
 type Message = McapTypes.TypedMcapRecords["Message"];
+type ChunkIndex = McapTypes.TypedMcapRecords["ChunkIndex"];
 
 /** A frame, and the camera's picture of it where the recording has one. */
 interface Recorded {
@@ -57,6 +58,13 @@ class FileBytes implements IReadable {
     return new Uint8Array(await piece.arrayBuffer());
   }
 }
+
+/** A reader of a recording, which has read its index alone. */
+const indexOf = (file: Blob): Promise<McapIndexedReader> =>
+  McapIndexedReader.Initialize({
+    readable: new FileBytes(file),
+    decompressHandlers: { zstd: (bytes) => decompress(bytes) },
+  });
 
 /** The grey levels of a JPEG. */
 async function greyOf(jpeg: Uint8Array): Promise<LumaMap> {
@@ -91,9 +99,9 @@ export class Player {
   /** The page has not taken the last frame yet; of those that come meanwhile the newest one waits. */
   private underWay = false;
   private waiting: Recorded | undefined;
-  /** By the time of a frame and by what is wrong with a part: each is met again when played again. */
+  /** By the time of a frame, which is met again when played again, and by where a part stands in the file. */
   private readonly broken = new Set<bigint>();
-  private readonly damaged = new Set<string>();
+  private readonly damaged = new Set<bigint>();
   private reason = "";
   private shown: Frame | undefined;
   /** Where the reference of the frame shown stands in the file. */
@@ -138,10 +146,7 @@ export class Player {
   private async open(): Promise<void> {
     let reader: McapIndexedReader | undefined;
     try {
-      reader = await McapIndexedReader.Initialize({
-        readable: new FileBytes(this.file),
-        decompressHandlers: { zstd: (bytes) => decompress(bytes) },
-      });
+      reader = await indexOf(this.file);
       const topics = [...reader.channelsById.values()];
       const frames = topics.find(({ topic }) => topic === FRAMES);
       if (reader.schemasById.get(frames?.schemaId ?? 0)?.name !== FrameSchema.typeName) {
@@ -170,29 +175,61 @@ export class Player {
     }
   }
 
-  /** What a topic's messages are from a time on, or from it back; damage is passed over. */
+  /** What a topic's messages are from a time on, or from it back. A damaged part of the file is left out,
+   * from then on. */
   private async *messages(topics: string[], from: bigint, reverse = false): AsyncGenerator<Message> {
     const { reader } = this;
     if (!reader) return;
-    for (let start = from; ; ) {
-      let reached = start;
+    let reached = from;
+    let given = 0; // messages of that time
+    for (;;) {
+      const start = reached;
+      let read = 0; // of the time `reached`, since `start`
       try {
         const range = reverse ? { endTime: start } : { startTime: start };
         for await (const message of reader.readMessages({ topics, reverse, ...range })) {
-          reached = message.logTime;
+          if (message.logTime !== reached) {
+            reached = message.logTime;
+            read = given = 0;
+          }
+          if (++read <= given) continue;
+          given = read;
           yield message;
         }
         return;
       } catch (error) {
-        this.damaged.add(words(error));
         this.reason ||= words(error);
-        const bounds = reader.chunkIndexes
-          .map((chunk) => (reverse ? chunk.messageEndTime : chunk.messageStartTime))
-          .filter((time) => (reverse ? time < reached : time > reached));
-        if (bounds.length === 0) return;
-        start = bounds.reduce((a, b) => (a < b !== reverse ? a : b));
+        if (!(await this.leaveOutDamaged(reached, reverse))) return;
       }
     }
+  }
+
+  /** Takes the part of the file that cannot be read from a time on, or from it back, out of the reader's
+   * index. False: each can be read. */
+  private async leaveOutDamaged(time: bigint, reverse: boolean): Promise<boolean> {
+    const all = this.reader?.chunkIndexes as ChunkIndex[];
+    const coming = all
+      .filter((chunk) => (reverse ? chunk.messageStartTime <= time : chunk.messageEndTime >= time))
+      .sort((a, b) =>
+        reverse
+          ? Number(b.messageEndTime - a.messageEndTime)
+          : Number(a.messageStartTime - b.messageStartTime),
+      );
+    for (const chunk of coming) {
+      // A reader of its own: the other one may be in use.
+      const alone = await indexOf(this.file);
+      const chunks = alone.chunkIndexes as ChunkIndex[];
+      chunks.splice(0, chunks.length, chunk);
+      try {
+        for await (const _ of alone.readMessages()) break;
+      } catch {
+        this.damaged.add(chunk.chunkStartOffset);
+        const at = all.findIndex(({ chunkStartOffset }) => chunkStartOffset === chunk.chunkStartOffset);
+        if (at >= 0) all.splice(at, 1);
+        return true;
+      }
+    }
+    return false;
   }
 
   /** The frames from a time on. A picture stands before its frame and has the same time. */
