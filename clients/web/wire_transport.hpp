@@ -18,7 +18,7 @@ class WireTransport : public net::Transport {
   WireTransport(std::shared_ptr<WebSocket> socket, net::Peer peer, std::shared_ptr<void> place);
 
   /// Sends a text as soon as what is being written is through. Of those that wait the last two
-  /// stay: a page that is told only of the end of a loss would not subscribe again.
+  /// stay: a page that hears of the end of a loss alone would not subscribe again.
   void send_text(std::string text);
 
   void on_authenticated() override { place_.reset(); }

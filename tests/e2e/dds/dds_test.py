@@ -406,7 +406,7 @@ class Recording(unittest.TestCase):
         by_topic = collections.defaultdict(list)
         for message in messages:
             self.assertEqual((message["profile"], message["encoding"]), ("ros2", "cdr"))
-            # Such a file's profiles are in rmw's numbers: 1 is transient local.
+            # Then the profiles are in rmw's numbers: 1 is transient local.
             self.assertEqual(message["rosbag2"], {"name": "rosbag2", "serialized_metadata": ""})
             latched = message["topic"] == "/tf_static" or message["topic"].endswith("/clock_mapping")
             self.assertIn(f"  durability: {1 if latched else 2}\n", message["qos"])
