@@ -107,10 +107,32 @@ void CellMap::read(std::span<const std::int16_t> depth_um) {
   read(depth_um, TileRows(static_cast<std::size_t>(grid_.rows()), grid_.all()));
 }
 
+// Depth is smooth: four rows of a cell stand for it.
+int CellMap::row_step() const noexcept { return std::max(1, cell_px_ / 4); }
+
+int CellMap::read_pixels() const noexcept {
+  return (cell_px_ + row_step() - 1) / row_step() * cell_px_;
+}
+
+bool CellMap::rest_is_pressed(std::span<const std::int16_t> depth_um,
+                              const TileRows& tiles) const noexcept {
+  int pressed = 0;
+  for (int y = 0; y < grid_.height; y += row_step()) {
+    const std::uint64_t word = tiles[static_cast<std::size_t>(y / TileGrid::kRows)];
+    const int begin = std::max(std::countr_zero(word) * grid_.tile_width(),
+                               y < rows_ * cell_px_ ? columns_ * cell_px_ : 0);
+    const int end =
+        std::min(static_cast<int>(std::bit_width(word)) * grid_.tile_width(), grid_.width);
+    const std::int16_t* const at = depth_um.data() + std::ptrdiff_t{y} * grid_.width;
+    for (int x = begin; x < end; ++x) pressed += at[x] > 1000 * kContactMm ? 1 : 0;
+  }
+  return 4 * pressed >= read_pixels();
+}
+
 void CellMap::read(std::span<const std::int16_t> depth_um, const TileRows& tiles) noexcept {
-  // Depth is smooth: four rows of a cell stand for it.
-  const int step = std::max(1, cell_px_ / 4);
-  const int pixels = (cell_px_ + step - 1) / step * cell_px_;
+  const int step = row_step();
+  const int pixels = read_pixels();
+  rest_pressed_ = rest_is_pressed(depth_um, tiles);
   std::ranges::fill(mm_, 0.0F);
   for (int row = 0; row < rows_; ++row) {
     bool any = false;
@@ -147,6 +169,7 @@ void CellMap::read(std::span<const std::int16_t> depth_um, const TileRows& tiles
 }
 
 bool CellMap::cut_off() const noexcept {
+  if (rest_pressed_) return true;
   const auto known = [&](int column, int row) {
     return column >= 0 && row >= 0 && column < columns_ && row < rows_ &&
            !std::isnan(mm_[index_of(row, columns_, column)]);

@@ -10,7 +10,7 @@
 namespace dtact::recon {
 
 /// A depth map's means over square cells of about 0.66 mm, at most 64 in each direction. Pixels at
-/// the right and at the bottom that fill no cell are left out.
+/// the right and at the bottom that fill no cell are left out, but cut_off() heeds them.
 class CellMap {
  public:
   /// Throws std::invalid_argument for a map smaller than one cell.
@@ -21,7 +21,8 @@ class CellMap {
   /// The same of all tiles.
   void read(std::span<const std::int16_t> depth_um);
 
-  /// Something presses a cell at the map's edge or beside a cell that is not known.
+  /// Something presses a cell at the map's edge or beside a cell that is not known, or the pixels
+  /// that fill no cell.
   [[nodiscard]] bool cut_off() const noexcept;
 
   [[nodiscard]] int columns() const noexcept { return columns_; }
@@ -31,6 +32,12 @@ class CellMap {
   [[nodiscard]] std::span<const float> mm() const noexcept { return mm_; }
 
  private:
+  [[nodiscard]] int row_step() const noexcept;     ///< From a row that is read to the next.
+  [[nodiscard]] int read_pixels() const noexcept;  ///< Of a cell.
+  /// Whether as many of the pixels that fill no cell are pressed as are a quarter of a cell.
+  [[nodiscard]] bool rest_is_pressed(std::span<const std::int16_t> depth_um,
+                                     const TileRows& tiles) const noexcept;
+
   TileGrid grid_;
   int cell_px_;
   double cell_mm_;
@@ -39,6 +46,7 @@ class CellMap {
   std::vector<float> mm_;
   std::vector<std::int32_t> sums_;       // of a row of cells, by the map's columns
   std::vector<std::int32_t> untrusted_;  // pixels of them
+  bool rest_pressed_ = false;
 };
 
 /// The response of a linear-elastic, incompressible gel bonded to a stiff block to an indentation.

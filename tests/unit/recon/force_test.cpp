@@ -190,6 +190,31 @@ TEST_F(ForceTest, IsNotKnownWhereTheContactIsCutOff) {
   EXPECT_EQ(read().absence, ForceAbsence::cut_off);
 }
 
+// 507 × 411 pixels are 31 × 25 cells of 16, and 11 columns and rows. Before: a contact that covered
+// those alone had a force of 0.
+TEST(CellMap, AContactIsCutOffByEachEdgeOfAnyMap) {
+  constexpr int kColumns = 507;
+  constexpr int kRows = 411;
+  const auto cut_off = [](int x, int y, int width, int height) {
+    std::vector<std::int16_t> map(std::size_t{kColumns} * kRows);
+    for (int row = y; row < y + height; ++row) {
+      for (int column = x; column < x + width; ++column) {
+        map[static_cast<std::size_t>(row * kColumns + column)] = 300;
+      }
+    }
+    CellMap cells(kColumns, kRows, kMmPerPx);
+    cells.read(map);
+    return cells.cut_off();
+  };
+  EXPECT_TRUE(cut_off(0, 160, 10, 64)) << "left";
+  EXPECT_TRUE(cut_off(160, 0, 64, 10)) << "top";
+  EXPECT_TRUE(cut_off(kColumns - 10, 160, 10, 64)) << "right";
+  EXPECT_TRUE(cut_off(160, kRows - 10, 64, 10)) << "bottom";
+  EXPECT_TRUE(cut_off(kColumns - 10, kRows - 10, 10, 10)) << "corner";
+  EXPECT_FALSE(cut_off(160, 160, 64, 64));
+  EXPECT_FALSE(cut_off(kColumns - 2, 160, 2, 8)) << "noise";
+}
+
 TEST_F(ForceTest, LooksWhereTheMapIsNotZeroAlone) {
   fill(112, 80, 96, 64, 500);
   const double all = read().force->newtons;
