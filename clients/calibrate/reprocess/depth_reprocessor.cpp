@@ -117,12 +117,13 @@ void DepthReprocessor::describe(const recon::DepthSums& sums, const pipeline::Re
   const pipeline::Trust trust{.light_left = follower_.left(), .light_unseen = follower_.unseen()};
   const int made = resolution.decimation();
   const int steps = resolution.steps();
-  const double bend_um = pipeline::bend_um(sums, resolution.reconstructor.model().mm_per_px);
+  const int beyond_pixels = resolution.reconstructor.beyond_pixels();
+  const double bend_um = pipeline::bend_um(sums, resolution.reconstructor.model().mm_per_px) *
+                         pipeline::rim_factor(sums.made, beyond_pixels);
   const double uncertainty_um =
       pipeline::uncertainty_at_um(maps.contact_um(summary_.deepest_mm, steps, trust),
                                   pipeline::plain_bend_um(bend_um, steps), made, steps);
-  const bool beyond = resolution.reconstructor.beyond_pixels() * made * made >
-                      pipeline::PipelineConfig{}.beyond_pixels;
+  const bool beyond = beyond_pixels * made * made > pipeline::PipelineConfig{}.beyond_pixels;
   pipeline::add_force(
       resolution, resolution.coarse ? std::span(resolution.coarse->depth_um) : std::span(depth_um_),
       beyond, uncertainty_um, summary_);

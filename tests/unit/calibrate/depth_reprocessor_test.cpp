@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "tests/fakes/scattering_toy.hpp"
+#include "tests/fakes/stepped_loop.hpp"
 
 namespace dtact::reprocess {
 namespace {
@@ -57,6 +58,22 @@ TEST(DepthReprocessor, CountsWhatTheCalibrationCannotSharpen) {
   EXPECT_EQ(plain.depth().sharpen_steps(), 0U);
   EXPECT_EQ(plain.depth().width(), 72U);
   EXPECT_EQ(remaker.unsharpened(), 1U);
+}
+
+// Before: as if the contact had been whole where it is deeper than the calibration covers.
+TEST(DepthReprocessor, IsAsUncertainAsTheDaemonBeyondTheCalibration) {
+  const fakes::ToyScene deep{.press_mm = 3};
+  fakes::SteppedLoop loop;
+  loop.begin(fakes::toy_calibration());
+  ASSERT_TRUE(loop.until_fresh());
+  loop.camera.scene = deep;
+  loop.step(4);
+  ASSERT_TRUE(loop.frame->health.has(pipeline::Health::beyond_calibration));
+  DepthReprocessor remaker(fakes::toy_calibration());
+  remaker.set_reference(fakes::toy_reference_q8());
+  v1::Frame frame = recorded(1, 0);
+  remaker.remake(fakes::ToyFrame(deep).view(), frame);
+  EXPECT_NEAR(frame.depth().uncertainty_um() / loop.frame->uncertainty_um, 1, 0.1);
 }
 
 // A map of a size that the daemon does not serve is made at full resolution.
