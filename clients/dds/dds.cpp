@@ -62,8 +62,8 @@ class Program {
  public:
   Program(const cli::Context& context, const Arguments& arguments)
       : out_(context.out),
-        local_(arguments.graph.interfaces.empty()),
-        addresses_(own_addresses()),
+        interfaces_(arguments.graph.interfaces),
+        addresses_(present_addresses()),
         graph_(arguments.graph) {
     std::vector<cli::NamedDaemon> daemons =
         cli::parse_daemons("--daemon", arguments.daemons, context.target);
@@ -120,8 +120,8 @@ class Program {
     }
   }
 
-  /// Until interrupted; returns true earlier when the machine has other addresses than at the
-  /// start.
+  /// Until interrupted; returns true earlier when the machine or the interfaces have had other
+  /// addresses than at the start, and have some.
   bool run() {
     auto next_second = Clock::now();
     for (;;) {
@@ -143,8 +143,10 @@ class Program {
         sensor.each_second(diagnostics);
       }
       if (diagnostics) write_diagnostics(diagnostics_, ros_now(), all);
+      const std::vector<std::string> present = present_addresses();
+      moved_ |= present != addresses_;
       // A recording goes on in its file.
-      if (local_ && !recorder_ && own_addresses() != addresses_) {
+      if (moved_ && !present.empty() && !recorder_) {
         log("the machine's addresses have changed: joining the graph again");
         return true;
       }
@@ -159,6 +161,10 @@ class Program {
   }
 
  private:
+  [[nodiscard]] std::vector<std::string> present_addresses() const {
+    return interfaces_.empty() ? own_addresses() : addresses_of(interfaces_);
+  }
+
   void add(const cli::NamedDaemon& daemon, const std::optional<client::Options>& perceive) {
     sensors_.emplace_back(graph_, daemon, perceive, settings_,
                           [this](const std::string& line) { log(line); });
@@ -211,9 +217,10 @@ class Program {
   }
 
   std::ostream& out_;
-  std::mutex mutex_;  ///< Guards `out_` and `found_`.
-  bool local_;        ///< Not beyond this machine.
-  std::vector<std::string> addresses_;
+  std::mutex mutex_;                     ///< Guards `out_` and `found_`.
+  std::vector<std::string> interfaces_;  ///< None: not beyond this machine.
+  std::vector<std::string> addresses_;   ///< At the start.
+  bool moved_ = false;                   ///< They have been others since.
   Settings settings_;
   Graph graph_;
   dds_entity_t transforms_ = 0;
@@ -248,16 +255,19 @@ void set_up(CLI::App& app, cli::Context& context) {
       ->envname("ROS_DOMAIN_ID")
       ->check(CLI::Range(0, 232))
       ->capture_default_str();
-  app.add_option("--interface", arguments->graph.interfaces,
-                 "Network interface, by name or address, to leave this machine through. "
-                 "Everybody in that network can then subscribe: DDS Security is not in Debian's "
-                 "Cyclone DDS")
-      ->type_name("NAME")
-      ->take_all();
+  CLI::Option* const interface =
+      app.add_option(
+             "--interface", arguments->graph.interfaces,
+             "Network interface, by name or address, to leave this machine through. "
+             "Everybody in that network can then subscribe: DDS Security is not in Debian's "
+             "Cyclone DDS")
+          ->type_name("NAME")
+          ->take_all();
   app.add_option("--peer", arguments->graph.peers,
                  "Another machine to look for participants on, where multicast does not reach it")
       ->type_name("ADDRESS")
-      ->take_all();
+      ->take_all()
+      ->needs(interface);
   CLI::Option* const read_only =
       app.add_flag("--read-only", arguments->read_only,
                    "Take no commands from the graph, which is the default with --interface");

@@ -45,7 +45,10 @@ std::string settings_of(const Graph::Config& config) {
       "<CycloneDDS><Domain><General><Interfaces>{}</Interfaces>{}</General><Discovery>"
       "<Peers>{}</Peers><ParticipantIndex>auto</ParticipantIndex>"
       "<MaxAutoParticipantIndex>100</MaxAutoParticipantIndex>"
-      "<SPDPInterval>1 s</SPDPInterval></Discovery></Domain></CycloneDDS>",
+      "<SPDPInterval>1 s</SPDPInterval></Discovery>"
+      // Several are ended by a packet to the own address, which may be gone by then.
+      "<Internal><MultipleReceiveThreads>false</MultipleReceiveThreads></Internal>"
+      "</Domain></CycloneDDS>",
       interfaces,
       local ? "<AllowMulticast>false</AllowMulticast><MaxMessageSize>65500B</MaxMessageSize>"
               "<FragmentSize>63000B</FragmentSize>"
@@ -157,20 +160,50 @@ bool is_address(const std::string& interface) {
          ::inet_pton(AF_INET6, interface.c_str(), &ignored) == 1;
 }
 
-std::vector<std::string> own_addresses() {
-  std::vector<std::string> addresses{"127.0.0.1"};
+namespace {
+
+/// An address of a network interface of this machine.
+struct InterfaceAddress {
+  std::string interface;
+  std::string address;
+  unsigned flags;
+};
+
+/// In the kernel's order; none where they cannot be had.
+std::vector<InterfaceAddress> interface_addresses() {
+  std::vector<InterfaceAddress> all;
   ifaddrs* list = nullptr;
-  if (::getifaddrs(&list) != 0) return addresses;
+  if (::getifaddrs(&list) != 0) return all;
   const std::unique_ptr<ifaddrs, decltype(&::freeifaddrs)> owner(list, &::freeifaddrs);
-  std::set<std::string> interfaces;
-  for (const ifaddrs* one = list; one != nullptr && addresses.size() < 4; one = one->ifa_next) {
+  for (const ifaddrs* one = list; one != nullptr; one = one->ifa_next) {
     if (one->ifa_addr == nullptr || one->ifa_addr->sa_family != AF_INET) continue;
-    const auto flags = one->ifa_flags;
-    if ((flags & IFF_UP) == 0 || (flags & IFF_LOOPBACK) != 0) continue;
     std::array<char, INET_ADDRSTRLEN> text{};
     const auto* address = reinterpret_cast<const sockaddr_in*>(one->ifa_addr);
     ::inet_ntop(AF_INET, &address->sin_addr, text.data(), text.size());
-    if (interfaces.insert(one->ifa_name).second) addresses.emplace_back(text.data());
+    all.push_back({one->ifa_name, text.data(), one->ifa_flags});
+  }
+  return all;
+}
+
+}  // namespace
+
+std::vector<std::string> own_addresses() {
+  std::vector<std::string> addresses{"127.0.0.1"};
+  std::set<std::string> interfaces;
+  for (const InterfaceAddress& one : interface_addresses()) {
+    if ((one.flags & IFF_UP) == 0 || (one.flags & IFF_LOOPBACK) != 0) continue;
+    if (addresses.size() < 4 && interfaces.insert(one.interface).second)
+      addresses.push_back(one.address);
+  }
+  return addresses;
+}
+
+std::vector<std::string> addresses_of(const std::vector<std::string>& interfaces) {
+  std::vector<std::string> addresses;
+  for (const InterfaceAddress& one : interface_addresses()) {
+    const bool named = std::ranges::count(interfaces, one.interface) > 0 ||
+                       std::ranges::count(interfaces, one.address) > 0;
+    if (named && (one.flags & IFF_UP) != 0) addresses.push_back(one.address);
   }
   return addresses;
 }
@@ -224,7 +257,7 @@ dds_entity_t Graph::add_writer(std::size_t node, const std::string& name,
       checked(dds_create_writer(participant_, topic("rt" + name, type), qos.get(), nullptr), name);
   nodes_[node].entities.push_back(writer);
   nodes_[node].writers.push_back(guid_of(writer));
-  published_.push_back({name, &type, kind, node});
+  published_.push_back({name, &type, kind, node, writer});
   return writer;
 }
 

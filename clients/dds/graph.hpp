@@ -45,6 +45,7 @@ class Graph {
     const dds_topic_descriptor_t* type;
     Qos qos;
     std::size_t node;
+    dds_entity_t writer;
   };
 
   /// Messages that a writer keeps for each reader.
@@ -99,6 +100,8 @@ class Graph {
 /// other addresses: at most four, which is what Cyclone takes. A Graph without interfaces keeps
 /// those that it began with.
 [[nodiscard]] std::vector<std::string> own_addresses();
+/// Those that network interfaces, by name or address, have at present.
+[[nodiscard]] std::vector<std::string> addresses_of(const std::vector<std::string>& interfaces);
 
 /// Whether Config::interfaces has an address: "192.0.2.7", but "eth0.100" is a name.
 [[nodiscard]] bool is_address(const std::string& interface);

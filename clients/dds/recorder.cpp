@@ -26,6 +26,15 @@ std::string ros_name(std::string name) {
   return name;
 }
 
+/// By which the messages of a writer are known.
+dds_instance_handle_t handle_of(dds_entity_t writer) {
+  dds_instance_handle_t handle = 0;
+  if (dds_get_instance_handle(writer, &handle) != DDS_RETCODE_OK) {
+    throw std::runtime_error("DDS: a writer has no handle");
+  }
+  return handle;
+}
+
 /// What a writer offers, as rosbag2 notes it up to version 8 of its metadata: rmw's numbers, in
 /// YAML. `ros2 bag play` offers the same; a listener of /tf_static takes nothing that is not
 /// latched.
@@ -63,10 +72,11 @@ Recorder::Recorder(Graph& graph, const std::string& file, bool replace)
       schema = writer_.add_schema(ros_name(type->name), "ros2msg", type->definition);
     }
     const dds_entity_t reader = graph.subscribe(one, waitset_);
-    channels_[reader] = {writer_.add_channel(schema, one.topic, "cdr",
-                                             {{"offered_qos_profiles", offered(one.qos)},
-                                              {"topic_type_hash", type->hash}}),
-                         one.topic != "/tf_static" && one.topic != "/diagnostics"};
+    channels_[reader] = {
+        writer_.add_channel(
+            schema, one.topic, "cdr",
+            {{"offered_qos_profiles", offered(one.qos)}, {"topic_type_hash", type->hash}}),
+        one.topic != "/tf_static" && one.topic != "/diagnostics", handle_of(one.writer)};
   }
   thread_ = std::thread([this] { run(); });
 }
@@ -124,7 +134,7 @@ void Recorder::take(dds_entity_t reader, const Channel& channel) {
       ddsi_serdata_to_ser(message, 0, buffer_.size(), buffer_.data());
     }
     ddsi_serdata_unref(message);
-    if (!info.valid_data) continue;
+    if (!info.valid_data || info.publication_handle != channel.writer) continue;
     writer_.add(mcap::Message{channel.id, static_cast<std::uint32_t>(messages_++),
                               static_cast<std::uint64_t>(ros_now()),
                               static_cast<std::uint64_t>(info.source_timestamp), buffer_});

@@ -39,7 +39,8 @@ class Recorder {
   void run();
   struct Channel {
     std::uint16_t id;
-    bool of_sensor;  ///< Not one that the bridge fills without a sensor.
+    bool of_sensor;                ///< Not one that the bridge fills without a sensor.
+    dds_instance_handle_t writer;  ///< Others may publish on the topic, too.
   };
   void take(dds_entity_t reader, const Channel& channel);
 

@@ -413,6 +413,7 @@ class Recording(unittest.TestCase):
             kept = 10 if message["topic"] == "/diagnostics" else 1
             self.assertIn(f"- history: 1\n  depth: {kept}\n  reliability: 1\n", message["qos"])
             by_topic[message["topic"]].append(message)
+        self.assertEqual(len(by_topic["/tf_static"]), 1, "of this program alone")
         for name in ("one", "two"):
             contacts = by_topic[f"/{name}/contact"]
             self.assertEqual(contacts[0]["type"], "dtact_msgs/msg/Contact")
@@ -504,6 +505,27 @@ class Network(unittest.TestCase):
             time.sleep(0.1)
         self.assertIn("addresses have changed", program.text())
         self.assertEqual(program.text().count("on DDS domain"), 2)
+        self.assertEqual(program.stop(), 0)
+
+    def test_an_interface_whose_address_goes(self) -> None:
+        # Before: nothing was sent any more once it had another one, and SIGTERM did not end the program.
+        alone = ["unshare", "--net", "sh", "-c", "ip link set lo up && ip link add v0 type veth peer name v1 && "
+                 "ip addr add 192.0.2.77/24 dev v0 && ip link set v0 up && ip link set v1 up && exec \"$@\"", "sh"]
+        if subprocess.run([*alone, "true"], capture_output=True).returncode != 0:
+            self.skipTest("a network namespace needs root")
+        program = Program([*alone, os.environ["DTACT_DDS"], "--daemon", "left=127.0.0.1:1", "--interface", "v0"],
+                          HERE / "interface.log", r"on DDS domain (\d+)")
+        inside = ["nsenter", f"--net=/proc/{program.process.pid}/ns/net", "ip", "addr"]
+        subprocess.run([*inside, "del", "192.0.2.77/24", "dev", "v0"], check=True)
+        time.sleep(2.5)
+        self.assertEqual(program.text().count("on DDS domain"), 1, "there is no address to join with")
+        subprocess.run([*inside, "add", "192.0.2.78/24", "dev", "v0"], check=True)
+        end = time.monotonic() + PATIENCE
+        while program.text().count("on DDS domain") < 2 and time.monotonic() < end:
+            time.sleep(0.1)
+        self.assertEqual(program.text().count("on DDS domain"), 2, program.text()[-2000:])
+        subprocess.run([*inside, "del", "192.0.2.78/24", "dev", "v0"], check=True)
+        time.sleep(1.5)
         self.assertEqual(program.stop(), 0)
 
 
