@@ -54,7 +54,8 @@ std::string usage(const std::string& path, const Command& command) {
 void append_commands(const std::string& path, const Command& parent, std::string& page) {
   for (const Command& command : parent.commands) {
     const std::string name = path.empty() ? command.name : path + " " + command.name;
-    if (command.commands.empty()) {
+    // A group's own options are given before its commands.
+    if (command.commands.empty() || !command.options.empty()) {
       page += heading(usage(name, command), "SS") + filled(escaped(sentence(command.text)));
       for (const Argument& argument : command.positionals) {
         page += entry(positional(argument), body(argument));
