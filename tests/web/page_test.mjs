@@ -1,6 +1,6 @@
 // The page in a browser, on simulated sensors: the shown values against the daemon's messages.
 import assert from "node:assert/strict";
-import { readFile } from "node:fs/promises";
+import { readFile, writeFile } from "node:fs/promises";
 import path from "node:path";
 import { after, before, beforeEach, test } from "node:test";
 import { accessibilityFaults, canvas, fact, numberOf, open, pause, PHONE, resume, until } from "./browser.mjs";
@@ -568,6 +568,52 @@ test("without a calibration the map's place offers to make one", async () => {
     await bareGateway.stop();
     await bare.stop();
   }
+});
+
+// Before: with the daemon there, the last frame stood as live, with its contact and its rate.
+test("while the camera is unplugged the last frame is not shown as live", async () => {
+  const faults = [...Array(20).keys()].map(
+    (i) => `[[fault]]\nkind = "unplug"\nframe = ${300 + 500 * i}\nframes = 200\n`,
+  );
+  const file = path.join(work, "unplugged.toml");
+  await writeFile(file, (await readFile(beyond, "utf8")) + faults.join(""));
+  const loose = await startDaemon("loose", 0, [`camera.sim.scene=${file}`]);
+  const looseGateway = await startGateway({ loose: loose.port });
+  const unplugged = await open(looseGateway);
+  const pane = unplugged.page.locator('[data-sensor="loose"]');
+  const shown = async () => ({
+    veil: await pane.locator(".veil p").textContent(),
+    rate: await fact(pane, "rate").textContent(),
+  });
+  try {
+    const isOld = ({ veil, rate }) => veil === "The last frame; the camera gives none." && rate === "";
+    const isLive = ({ veil, rate }) => veil === "" && /fps/.test(rate);
+    for (const state of [isOld, isLive, isOld]) await until(shown, state);
+  } finally {
+    await unplugged.close();
+    await looseGateway.stop();
+    await loose.stop();
+  }
+});
+
+// Before: the picture of an hour ago stood as that of the paused frame.
+test("a paused frame is not shown by a picture of another moment", async () => {
+  const veil = () => pane.locator(".veil p").textContent();
+  const look = (name) => pane.getByRole("radio", { name }).click();
+  await look("Camera");
+  await until(
+    () => pane.locator("canvas.map").getAttribute("width"),
+    (width) => width === "800",
+  );
+  await look("Depth");
+  await new Promise((done) => setTimeout(done, 2000));
+  await pause(pane);
+  assert.equal(await veil(), "");
+  await look("Camera");
+  await until(veil, (text) => text === "This frame came without the camera's picture: resume, or choose another view.");
+  await look("Depth");
+  await until(veil, (text) => text === "");
+  await resume(pane);
 });
 
 test("behind a proxy's path it shows depth", async () => {

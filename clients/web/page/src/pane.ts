@@ -1,6 +1,6 @@
 // One sensor: its picture, its panels, and what its connection says.
 import { create } from "@bufbuild/protobuf";
-import { GetReferenceSchema, State } from "../gen/dtact_pb";
+import { GetReferenceSchema, Health, State } from "../gen/dtact_pb";
 import type { Event, HelloReply, Status } from "../gen/dtact_pb";
 import { button, Choice, el, say } from "./dom";
 import { keepToken, keptToken } from "./kept";
@@ -28,6 +28,9 @@ import { fixed } from "./labels";
 
 /** Update interval of numbers that change with every frame: faster is unreadable. */
 const REPORT_MS = 100;
+
+/** From frame to frame the camera's picture may be left out, when it comes less often. */
+const OLD_MS = 1000;
 
 const KEYS_OF_POINTS = [" ", "ArrowLeft", "ArrowRight"];
 
@@ -74,6 +77,7 @@ export class Pane {
   private lastStatus: Status | undefined;
   private servesPoints = false;
   private paused = false;
+  private closed = false;
   private reportedAt = 0;
 
   /** Of a sensor, or of a recording named so. Throws where the browser has no WebGL 2. */
@@ -128,6 +132,13 @@ export class Pane {
 
   /** What is recorded comes from the worker, which therefore ends last. */
   async close(): Promise<void> {
+    this.closed = true;
+    // Listeners of theirs at the window would keep the whole pane.
+    this.surface?.close();
+    this.cloud?.close();
+    this.surface = this.cloud = undefined;
+    this.plots.close();
+    this.profile.close();
     this.element.remove();
     await this.recording.close();
     this.sensor.close();
@@ -247,11 +258,14 @@ export class Pane {
     this.stage.look(view);
     this.sensor.want(this.wants());
     if (view === "difference") void this.fetchReference();
+    else this.clearNoReference();
+    // The frame that stays may have come without what is looked at now.
+    if (this.paused && !this.file) this.sensor.step(0);
     if (view !== "surface") return;
     if (!this.surface) {
       const part = await import("./surface/surface").catch(() => undefined);
       if (!part) return this.showNotice(RELOAD);
-      if (this.servesPoints) return;
+      if (this.servesPoints || this.closed) return;
       this.surface ??= new part.SurfaceView(this.stage.surfaceHost);
     }
     if (this.stage.depth) this.surface.show(this.stage.depth, this.stage.range);
@@ -260,7 +274,10 @@ export class Pane {
   /** The daemon's reference image, in the present light. */
   private async fetchReference(): Promise<void> {
     // An old one would be taken from pictures in another light.
-    if (this.views.value !== "difference") return void (this.stage.reference = undefined);
+    if (this.views.value !== "difference") {
+      this.stage.reference = undefined;
+      return this.clearNoReference();
+    }
     try {
       const result = await this.sensor.request({
         case: "getReference",
@@ -279,11 +296,15 @@ export class Pane {
       this.stage.reference = { width, height, values };
       // No frame follows that would show it.
       if (this.paused) this.sensor.step(0);
-      if (this.notice.textContent?.startsWith(NO_REFERENCE)) this.showNotice("");
+      this.clearNoReference();
     } catch (error) {
       this.stage.reference = undefined;
-      this.showNotice(NO_REFERENCE + (error as Error).message);
+      if (this.views.value === "difference") this.showNotice(NO_REFERENCE + (error as Error).message);
     }
+  }
+
+  private clearNoReference(): void {
+    if (this.notice.textContent?.startsWith(NO_REFERENCE)) this.showNotice("");
   }
 
   /** dtact-perceive serves no maps, and is commanded nothing. */
@@ -296,7 +317,7 @@ export class Pane {
     if (this.cloud) return;
     const part = await import("./surface/cloud").catch(() => undefined);
     if (!part) return this.showNotice(RELOAD);
-    if (this.servesPoints) this.cloud ??= new part.CloudView(this.stage.surfaceHost);
+    if (this.servesPoints && !this.closed) this.cloud ??= new part.CloudView(this.stage.surfaceHost);
   }
 
   /** Another daemon may serve maps where one of points was. */
@@ -385,12 +406,23 @@ export class Pane {
     if (status.light) this.light.show(status.light);
     this.camera.show(status.camera?.settings);
     if (status.reconstruction) this.reconstruction.show(status.reconstruction);
+    this.standStill(status.health.includes(Health.CAMERA_FAULT), status.advice);
+  }
+
+  /** The camera gives no frames, so that none tells that the one shown is old. */
+  private standStill(stands: boolean, advice: string): void {
+    if (this.file || this.paused) return;
+    this.element.classList.toggle("stands", stands);
+    if (!stands) return;
+    this.stage.cover(this.frame ? "The last frame; the camera gives none." : advice);
+    say(this.rate, "");
   }
 
   private show(frame: Frame): boolean {
     // One that was still on its way when the view was paused, or went on.
-    if (this.paused !== (frame.behind !== undefined)) return false;
+    if (this.closed || this.paused !== (frame.behind !== undefined)) return false;
     this.frame = frame;
+    this.element.classList.remove("stands");
     if (!this.paused) this.meter.count(frame);
     this.stage.cover(this.coverOf(frame), this.offersCalibration(frame) ? this.calibrate : undefined);
     this.stage.show(frame);
@@ -411,6 +443,13 @@ export class Pane {
   }
 
   private coverOf(frame: Frame): string {
+    // Parts that the view did not need were not sent, so what is drawn may be of long ago.
+    const drawn = this.stage.frameOfPicture;
+    const isOld = drawn !== undefined && Math.abs(drawn.wallMs - frame.wallMs) > OLD_MS;
+    if (this.paused && !this.file && isOld) {
+      const part = isPicture(this.views.value) ? "the camera's picture" : "its map";
+      return `This frame came without ${part}: resume, or choose another view.`;
+    }
     if (this.views.value === "difference" && !this.stage.reference)
       return "Waiting for the reference.";
     if (isPicture(this.views.value) && this.file && !this.sensor.features.includes("jpeg"))

@@ -6,6 +6,7 @@ import type { Profile } from "../view/reading";
 
 const SECONDS = 30;
 const REDRAW_MS = 250;
+const PROFILE_MS = 60;
 /** More frames a second than this are thinned: no screen shows them. */
 const MAX_POINTS = 1800;
 
@@ -137,6 +138,10 @@ export class Plots {
     }
   }
 
+  close(): void {
+    for (const { plot } of this.plots.splice(0)) plot.destroy();
+  }
+
   private clear(): void {
     this.times.length = 0;
     for (const entry of this.plots) entry.values.length = 0;
@@ -153,10 +158,18 @@ export class ProfilePlot {
   );
   private plot: uPlot | undefined;
   private drawnAt = 0;
+  private later: ReturnType<typeof setTimeout> | undefined;
 
   show(profile: Profile | undefined, range: { fromMm: number; toMm: number }): void {
     this.element.hidden = profile === undefined;
-    if (!profile || performance.now() - this.drawnAt < 60) return;
+    clearTimeout(this.later);
+    if (!profile) return;
+    // The last one is drawn, too, though none may follow it.
+    const wait = this.drawnAt + PROFILE_MS - performance.now();
+    if (wait > 0) {
+      this.later = setTimeout(() => this.show(profile, range), wait);
+      return;
+    }
     this.drawnAt = performance.now();
     this.plot ??= plotIn(
       this.canvas,
@@ -186,5 +199,11 @@ export class ProfilePlot {
         ),
     );
     this.plot.setData([profile.alongMm, profile.depthMm]);
+  }
+
+  /** Nothing is shown afterwards. */
+  close(): void {
+    clearTimeout(this.later);
+    this.plot?.destroy();
   }
 }
