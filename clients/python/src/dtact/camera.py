@@ -84,7 +84,7 @@ class Camera:
     :param address: see dtact.Client, as for `token`, `token_file`, `fingerprint` and `ca_file`.
     :param fps: frames a second, at most the daemon's; None: the daemon's.
     :param width: and `height`: size of depth and image in pixels, the daemon's or a half or a
-        quarter of it; None: the daemon's.
+        quarter of it; None: the largest that always comes, of resolution "auto" a quarter.
     :param use_rgb: and `use_depth`, as in LeRobot's depth cameras; one of them at least.
     :param picture: "depth": the image is the depth in colours; "camera": the camera's own image, grey,
         of the camera's size, without depth.
