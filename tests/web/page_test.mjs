@@ -573,7 +573,7 @@ test("without a calibration the map's place offers to make one", async () => {
 // Before: with the daemon there, the last frame stood as live, with its contact and its rate.
 test("while the camera is unplugged the last frame is not shown as live", async () => {
   const faults = [...Array(20).keys()].map(
-    (i) => `[[fault]]\nkind = "unplug"\nframe = ${300 + 500 * i}\nframes = 200\n`,
+    (i) => `[[fault]]\nkind = "unplug"\nframe = ${100 + 170 * i}\nframes = 80\n`,
   );
   const file = path.join(work, "unplugged.toml");
   await writeFile(file, (await readFile(beyond, "utf8")) + faults.join(""));
