@@ -186,6 +186,17 @@ class Aio(unittest.IsolatedAsyncioTestCase):
                     await s.next(1)
                 await self.until(lambda: daemon.ended == 2)
 
+    async def test_no_use_after_close(self):
+        with FakeDaemon() as daemon:
+            s = dtact.aio.connect(daemon.address, reconnect=True)
+            async with s:
+                pass
+            # Before: it gave a frame that the first block had left, however long ago.
+            with self.assertRaisesRegex(dtact.ConnectionError, "was closed"):
+                async with s:
+                    pass
+            self.assertEqual(daemon.connections, 1)
+
     async def test_giving_up_the_first_connection(self):
         with FakeDaemon() as daemon:
             daemon.answers["hello"] = False

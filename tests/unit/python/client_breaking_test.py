@@ -1,5 +1,6 @@
 """The blocking client when the connection ends."""
 import os
+import signal
 import tempfile
 import time
 import unittest
@@ -148,6 +149,26 @@ class Breaking(unittest.TestCase):
             while s.next(0.05) is not None:
                 pass
             self.assertLess(s._next_attempt - s._opened_at, 0.11)
+
+    def test_an_interrupt_while_it_connects_again(self):
+        def interrupt(*_):
+            raise KeyboardInterrupt
+        with FakeDaemon() as daemon, dtact.connect(daemon.address, reconnect=True) as s:
+            daemon.pushed = [frame(1)]
+            self.assertEqual(next(s.frames()).sequence, 1)
+            daemon.answers["hello"] = False
+            daemon.drop()
+            before = signal.signal(signal.SIGALRM, interrupt)
+            try:
+                signal.setitimer(signal.ITIMER_REAL, 0.5)
+                with self.assertRaises(KeyboardInterrupt):
+                    next(s.frames(timeout=30))
+            finally:
+                signal.signal(signal.SIGALRM, before)
+            del daemon.answers["hello"]
+            daemon.pushed = [frame(2)]
+            # Before: the connection stayed open without a subscription, and nothing came.
+            self.assertEqual(next(s.frames(timeout=10)).sequence, 2)
 
     def test_no_use_after_close(self):
         with FakeDaemon() as daemon:

@@ -127,9 +127,12 @@ class Client(Session):
     _opening: asyncio.Task[None] | None = None
     #: The first that it is used in.
     _loop: asyncio.AbstractEventLoop | None = None
+    _closed = False
 
     async def __aenter__(self) -> Client:
         self._check_loop()
+        if self._closed:
+            raise self._broken
         try:
             await self._ensure_open()
         except asyncio.CancelledError:
@@ -142,7 +145,8 @@ class Client(Session):
         await self.close()
 
     async def close(self) -> None:
-        """Ends the connection."""
+        """Ends the connection. It cannot be used again."""
+        self._closed = True
         self._reconnect = False
         if self._opening is not None:
             self._opening.cancel()

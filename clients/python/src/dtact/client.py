@@ -272,8 +272,9 @@ class Client(Session):
             self._server = server
             if self._subscription is not None:
                 self._exchange(self._subscribe_request(self._subscription, again=True), deadline)
-        except Error as e:
-            self._lost(e)
+        except BaseException as e:  # Ctrl-C too: the link would stay open, without a subscription.
+            self._lost(e if isinstance(e, Error) else ConnectionError(
+                f"connecting to {self._address} was given up"))
             self._note_failure()
             raise
         self._note_return()

@@ -2,6 +2,7 @@
 whatever this one does, and writes the MCAP that all other tools read."""
 from __future__ import annotations
 
+import atexit
 import os
 import selectors
 import shutil
@@ -32,6 +33,9 @@ class Recording:
         command = [program, *_target(address), *options, "record", "-o", str(path)]
         self._process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
         self._said = b""  # On standard error so far.
+        self._maker = os.getpid()
+        # Without stop() it would record until the disk is full.
+        atexit.register(self._end)
         try:
             started = self._await_start(_START_S + timeout)
         except BaseException:
@@ -75,8 +79,9 @@ class Recording:
     def _end(self) -> bool:
         """Lets dtactctl finish, unless it has. False: it did not, and was killed."""
         assert self._process.stderr is not None
-        if self._process.stderr.closed:
+        if self._process.stderr.closed or os.getpid() != self._maker:
             return True
+        atexit.unregister(self._end)
         if self._process.poll() is None:
             self._process.send_signal(signal.SIGTERM)
         try:
