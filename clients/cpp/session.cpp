@@ -212,6 +212,8 @@ void Session::subscribe(const v1::Subscribe& subscription) {
   *message.mutable_subscribe() = subscription;
   (void)request(message, options_.timeout);
   subscription_ = subscription;
+  // What came before the answer is as the subscription before asked.
+  std::erase_if(inbox_, [](const Item& item) { return std::holds_alternative<v1::Frame>(item); });
 }
 
 std::optional<Item> Session::next(const Limit& limit) {

@@ -113,6 +113,29 @@ TEST(Using, TheLongestTimeoutIsNoneInThePast) {
   EXPECT_FALSE(client.next(milliseconds::min()).has_value());
 }
 
+// Before: up to four frames as the earlier subscription had asked came after the later one's
+// answer.
+TEST(Using, ASubscriptionsFramesAreItsOwn) {
+  PlayedDaemon daemon({[](Peer& peer) {
+    peer.greet();
+    peer.done();
+    peer.frame(41);
+    const v1::ClientMessage again = peer.request();
+    peer.frame(42);
+    v1::ServerMessage done;
+    done.mutable_reply()->set_id(again.id());
+    done.mutable_reply()->mutable_done();
+    peer.send(done);
+    peer.frame(43);
+  }});
+  Client client(daemon.options);
+  client.subscribe();
+  client.subscribe();
+  const auto item = client.next(kLong);
+  ASSERT_TRUE(item && std::holds_alternative<v1::Frame>(*item));
+  EXPECT_EQ(std::get<v1::Frame>(*item).sequence(), 43U);
+}
+
 TEST(Using, ASecondThreadIsNamedAndTheFirstGoesOn) {
   PlayedDaemon daemon({[](Peer& peer) {
     peer.greet();
