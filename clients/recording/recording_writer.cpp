@@ -28,10 +28,13 @@ std::uint16_t RecordingWriter::add_channel(const char* topic,
 RecordingWriter::Moment RecordingWriter::moment_of(std::uint64_t sequence,
                                                    std::int64_t monotonic_ns,
                                                    std::int64_t wall_ns) {
-  if (!epoch_ns_) {
+  // That far back: the daemon's machine restarted behind a program that passes frames on.
+  constexpr std::int64_t kOtherBoot = 10'000'000'000;
+  if (!epoch_ns_ || monotonic_ns < newest_ns_ - kOtherBoot) {
     epoch_ns_ = wall_ns - monotonic_ns;
-    next_picture_ns_ = monotonic_ns;
+    next_picture_ns_ = newest_ns_ = monotonic_ns;
   }
+  newest_ns_ = std::max(newest_ns_, monotonic_ns);
   const auto positive = [](std::int64_t ns) {
     return static_cast<std::uint64_t>(std::max<std::int64_t>(0, ns));
   };

@@ -69,8 +69,9 @@ class RecordingWriter {
   std::uint16_t pose_ = 0;
   std::uint16_t transforms_ = 0;
   bool points_shown_ = false;  ///< The last points were some.
-  /// Wall time of CLOCK_MONOTONIC's zero, at the first frame or event.
+  /// Wall time of CLOCK_MONOTONIC's zero, at the first frame or event of a boot.
   std::optional<std::int64_t> epoch_ns_;
+  std::int64_t newest_ns_ = 0;  ///< CLOCK_MONOTONIC of the newest one.
   Moment now_;
   std::int64_t next_picture_ns_ = 0;
   std::string last_light_;

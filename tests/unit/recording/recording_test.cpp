@@ -155,6 +155,23 @@ TEST_F(RecordingFile, TimesRunOnWhenTheWallClockIsSet) {
               ElementsAre(Row(1, kBegin + 20'000'000, kBegin - 3'599'000'000'000)));
 }
 
+// Behind dtact-perceive a recording goes on when the daemon's machine restarts. Before: it went on
+// at the times of the earlier boot.
+TEST_F(RecordingFile, TimesRunOnWhenTheDaemonsMachineRestarts) {
+  RecordingWriter writer(sink_, {.program = "test"});
+  v1::Frame first = sample_frame(0);
+  first.set_monotonic_ns(100'000'000'000);
+  writer.add(first);
+  v1::Frame later = sample_frame(0);
+  later.set_monotonic_ns(3'000'000'000);
+  later.set_wall_ns(kWall + 60'000'000'000);
+  writer.add(later);
+  writer.finish();
+  constexpr std::uint64_t kBegin = kWall;
+  constexpr std::uint64_t kAgain = kWall + 60'000'000'000;
+  EXPECT_THAT(rows(kFrameTopic), ElementsAre(Row(0, kBegin, kBegin), Row(0, kAgain, kAgain)));
+}
+
 TEST_F(RecordingFile, ReportsEachLightOnce) {
   RecordingWriter writer(sink_, {.program = "test"});
   for (std::uint64_t i = 0; i < 4; ++i) {
