@@ -15,6 +15,7 @@
 #include <utility>
 
 #include "hal/base/clock.hpp"
+#include "hal/base/device_allow.hpp"
 #include "hal/libcamera/sensor_mode.hpp"
 #include "hal/libcamera/skip_frames.hpp"
 #include "hal/live/source.hpp"
@@ -30,7 +31,11 @@ using live::DeviceError;
   if (error == EBUSY) {
     throw DeviceError(CameraState::busy, fmt::format("another program uses {}: end it", id));
   }
-  if (error == EACCES || error == EPERM) {
+  if (error == EPERM) {
+    throw DeviceError(CameraState::denied,
+                      fmt::format("no permission to use {}: {}", id, base::kDeviceAllowFix));
+  }
+  if (error == EACCES) {
     throw DeviceError(CameraState::denied,
                       fmt::format("no permission to use {}: add the daemon's user to the group "
                                   "video (usermod -aG video USER) and start it again",

@@ -7,6 +7,8 @@
 #include <fstream>
 #include <system_error>
 
+#include "hal/base/device_allow.hpp"
+
 namespace dtact::hal::v4l2 {
 
 DeviceError error_of(int error, const std::string& what, const std::string& node) {
@@ -19,8 +21,10 @@ DeviceError error_of(int error, const std::string& what, const std::string& node
               fmt::format("the USB bus of {} has no bandwidth left: plug the camera into another "
                           "controller, or choose the pixel format mjpeg or a lower rate",
                           node)};
-    case EACCES:
     case EPERM:
+      return {CameraState::denied,
+              fmt::format("no permission to open {}: {}", node, base::kDeviceAllowFix)};
+    case EACCES:
       return {CameraState::denied,
               fmt::format("no permission to open {}: add the daemon's user to the group video "
                           "(usermod -aG video USER) and start it again",

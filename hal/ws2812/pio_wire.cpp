@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "hal/base/device_allow.hpp"
 #include "hal/base/unique_fd.hpp"
 #include "hal/ws2812/encoder.hpp"
 
@@ -81,7 +82,9 @@ int PioWire::write(std::span<const std::uint8_t> bytes) noexcept {
 
 std::string PioWire::failed(int error) const {
   const char* fix = "see the kernel's log (dmesg) for the driver's own words";
-  if (error == EACCES || error == EPERM) {
+  if (error == EPERM) {
+    fix = base::kDeviceAllowFix;
+  } else if (error == EACCES) {
     fix =
         "put the user into the group that owns it (sudo usermod -aG gpio <user>) and install "
         "config/udev/60-dtactd.rules";

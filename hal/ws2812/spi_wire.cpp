@@ -15,6 +15,8 @@
 #include <utility>
 #include <vector>
 
+#include "hal/base/device_allow.hpp"
+
 namespace dtact::hal::ws2812 {
 namespace {
 
@@ -29,8 +31,9 @@ std::size_t read_bufsiz() {
 
 std::string spi_fix(int error) {
   switch (error) {
-    case EACCES:
     case EPERM:
+      return base::kDeviceAllowFix;
+    case EACCES:
       return "put the user into the group that owns it (sudo usermod -aG spi <user>) and install "
              "config/udev/60-dtactd.rules";
     case ENOENT:

@@ -73,6 +73,11 @@ INSTANTIATE_TEST_SUITE_P(
                      "again"},
         StartFailure{VIDIOC_STREAMON, EBUSY, CameraState::busy, kBusy},
         StartFailure{VIDIOC_STREAMON, EACCES, CameraState::denied, kDenied},
+        // The unit's device filter. Before: the group, in which the user is already.
+        StartFailure{VIDIOC_STREAMON, EPERM, CameraState::denied,
+                     "no permission to open /dev/video0: the service's unit does not allow it: "
+                     "restart the unit, which then takes the device's present number, or name it "
+                     "in DeviceAllow= (systemctl edit)"},
         StartFailure{VIDIOC_STREAMON, ENOSPC, CameraState::busy,
                      "the USB bus of /dev/video0 has no bandwidth left: plug the camera into "
                      "another controller, or choose the pixel format mjpeg or a lower rate"}));

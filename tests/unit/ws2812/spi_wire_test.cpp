@@ -135,6 +135,8 @@ TEST(Ws2812SpiWire, ErrorsNameDeviceAndFix) {
   EXPECT_THAT(wire.send({}), HasSubstr("/dev/fakespi: write failed: Permission denied: put the "
                                        "user into the group"));
   EXPECT_THAT(wire.prepare(8), HasSubstr("Permission denied"));
+  bench.port.error = EPERM;
+  EXPECT_THAT(wire.send({}), HasSubstr("DeviceAllow="));
   bench.port.error = EMSGSIZE;
   EXPECT_THAT(wire.send({}), HasSubstr("spidev.bufsiz"));
 }
