@@ -215,6 +215,7 @@ void CaptureLoop::publish(DepthFrame& out) noexcept {
 void CaptureLoop::without_frame(hal::GrabStatus status, std::int64_t asked_ns,
                                 std::int64_t now_ns) noexcept {
   watch_.missed(status, now_ns);
+  if (watch_.away()) controls_moved_ = false;
   exchange_.camera_damaged.store(watch_.damaged(), std::memory_order_relaxed);
   // A slow camera is silent for longer between two frames.
   const std::int64_t silence_ns = std::max(kSecond, hal::stall_ns(period_ns_));

@@ -441,7 +441,12 @@ void LiveCamera::watch_controls() noexcept {
     const std::lock_guard controls_guard(controls_mutex_);
     guard.lock();
     std::shared_ptr<Connection> held = connection_;
-    if (!held) continue;
+    if (!held) {
+      // What is said of controls was of a camera that has gone.
+      moved_.clear();
+      controls_moved_.store(false);
+      continue;
+    }
     try {
       std::vector<CameraControl> controls = info_.controls;
       guard.unlock();
@@ -450,6 +455,7 @@ void LiveCamera::watch_controls() noexcept {
       held.reset();  // may close the device: not under the mutex
       guard.lock();
       const bool same = checked == connection_.get();
+      if (!same) moved.clear();
       controls_moved_.store(!moved.empty());
       moved_ = std::move(moved);
       if (same) info_.controls = std::move(controls);

@@ -227,6 +227,20 @@ TEST(CaptureLoop, AControlThatIsSetBackBeginsAnewOnce) {
   EXPECT_NEAR(loop.frame->contact.deepest_mm, 0.5, 0.02);
 }
 
+// Before: a camera that was unplugged then was said to differ, for as long as it was away.
+TEST(CaptureLoop, WhatIsSaidOfControlsGoesWithTheCamera) {
+  SteppedLoop loop;
+  loop.begin(toy_calibration());
+  ASSERT_TRUE(loop.until_fresh());
+  loop.camera.flags = hal::kFrameControlsMoved;
+  loop.step(1);
+  EXPECT_TRUE(loop.health().has(Health::camera_mismatch));
+  loop.camera.status = hal::GrabStatus::unplugged;
+  loop.step(2);
+  EXPECT_TRUE(loop.health().has(Health::camera_fault));
+  EXPECT_FALSE(loop.health().has(Health::camera_mismatch));
+}
+
 TEST(CaptureLoop, EveryFrameReportsTheForceThatTheCalibrationKnows) {
   auto calibration = toy_calibration();
   auto model = std::make_shared<recon::Model>(*calibration->model);
