@@ -406,14 +406,14 @@ export class Pane {
     if (status.light) this.light.show(status.light);
     this.camera.show(status.camera?.settings);
     if (status.reconstruction) this.reconstruction.show(status.reconstruction);
-    this.standStill(status.health.includes(Health.CAMERA_FAULT), status.advice);
+    this.showCameraAway(status.health.includes(Health.CAMERA_FAULT), status.advice);
   }
 
   /** The camera gives no frames, so that none tells that the one shown is old. */
-  private standStill(stands: boolean, advice: string): void {
+  private showCameraAway(away: boolean, advice: string): void {
     if (this.file || this.paused) return;
-    this.element.classList.toggle("stands", stands);
-    if (!stands) return;
+    this.element.classList.toggle("camera-away", away);
+    if (!away) return;
     this.stage.cover(this.frame ? "The last frame; the camera gives none." : advice);
     say(this.rate, "");
   }
@@ -422,7 +422,7 @@ export class Pane {
     // One that was still on its way when the view was paused, or went on.
     if (this.closed || this.paused !== (frame.behind !== undefined)) return false;
     this.frame = frame;
-    this.element.classList.remove("stands");
+    this.element.classList.remove("camera-away");
     if (!this.paused) this.meter.count(frame);
     this.stage.cover(this.coverOf(frame), this.offersCalibration(frame) ? this.calibrate : undefined);
     this.stage.show(frame);

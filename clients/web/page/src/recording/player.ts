@@ -59,8 +59,8 @@ class FileBytes implements IReadable {
   }
 }
 
-/** A reader of a recording, which has read its index alone. */
-const indexOf = (file: Blob): Promise<McapIndexedReader> =>
+/** A reader of a recording, which has read no more than its index. */
+const readerOf = (file: Blob): Promise<McapIndexedReader> =>
   McapIndexedReader.Initialize({
     readable: new FileBytes(file),
     decompressHandlers: { zstd: (bytes) => decompress(bytes) },
@@ -146,7 +146,7 @@ export class Player {
   private async open(): Promise<void> {
     let reader: McapIndexedReader | undefined;
     try {
-      reader = await indexOf(this.file);
+      reader = await readerOf(this.file);
       const topics = [...reader.channelsById.values()];
       const frames = topics.find(({ topic }) => topic === FRAMES);
       if (reader.schemasById.get(frames?.schemaId ?? 0)?.name !== FrameSchema.typeName) {
@@ -184,6 +184,7 @@ export class Player {
     let given = 0; // messages of that time
     for (;;) {
       const start = reached;
+      const parts = reader.chunkIndexes.length;
       let read = 0; // of the time `reached`, since `start`
       try {
         const range = reverse ? { endTime: start } : { startTime: start };
@@ -199,14 +200,16 @@ export class Player {
         return;
       } catch (error) {
         this.reason ||= words(error);
-        if (!(await this.leaveOutDamaged(reached, reverse))) return;
+        await this.leaveOutDamaged(reached, reverse);
+        // Another run may have left out the part that this one met.
+        if (reader.chunkIndexes.length === parts) return;
       }
     }
   }
 
   /** Takes the part of the file that cannot be read from a time on, or from it back, out of the reader's
-   * index. False: each can be read. */
-  private async leaveOutDamaged(time: bigint, reverse: boolean): Promise<boolean> {
+   * index. */
+  private async leaveOutDamaged(time: bigint, reverse: boolean): Promise<void> {
     const all = this.reader?.chunkIndexes as ChunkIndex[];
     const coming = all
       .filter((chunk) => (reverse ? chunk.messageStartTime <= time : chunk.messageEndTime >= time))
@@ -215,10 +218,11 @@ export class Player {
           ? Number(b.messageEndTime - a.messageEndTime)
           : Number(a.messageStartTime - b.messageStartTime),
       );
+    // A reader of its own: the other one may be in use. None where the file itself is gone.
+    const alone = await readerOf(this.file).catch(() => undefined);
+    if (!alone) return;
+    const chunks = alone.chunkIndexes as ChunkIndex[];
     for (const chunk of coming) {
-      // A reader of its own: the other one may be in use.
-      const alone = await indexOf(this.file);
-      const chunks = alone.chunkIndexes as ChunkIndex[];
       chunks.splice(0, chunks.length, chunk);
       try {
         for await (const _ of alone.readMessages()) break;
@@ -226,10 +230,9 @@ export class Player {
         this.damaged.add(chunk.chunkStartOffset);
         const at = all.findIndex(({ chunkStartOffset }) => chunkStartOffset === chunk.chunkStartOffset);
         if (at >= 0) all.splice(at, 1);
-        return true;
+        return;
       }
     }
-    return false;
   }
 
   /** The frames from a time on. A picture stands before its frame and has the same time. */
