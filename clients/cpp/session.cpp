@@ -212,7 +212,7 @@ void Session::subscribe(const v1::Subscribe& subscription) {
   *message.mutable_subscribe() = subscription;
   (void)request(message, options_.timeout);
   subscription_ = subscription;
-  // What came before the answer is as the subscription before asked.
+  // Frames that came before the answer are of the earlier subscription.
   std::erase_if(inbox_, [](const Item& item) { return std::holds_alternative<v1::Frame>(item); });
 }
 

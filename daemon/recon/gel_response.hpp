@@ -10,7 +10,7 @@
 namespace dtact::recon {
 
 /// A depth map's means over square cells of about 0.66 mm, at most 64 in each direction. Pixels at
-/// the right and at the bottom that fill no cell are left out, but cut_off() heeds them.
+/// the right and at the bottom that fill no cell belong to none, but cut_off() counts them.
 class CellMap {
  public:
   /// Throws std::invalid_argument for a map smaller than one cell.
@@ -34,7 +34,7 @@ class CellMap {
  private:
   [[nodiscard]] int row_step() const noexcept;     ///< From a row that is read to the next.
   [[nodiscard]] int read_pixels() const noexcept;  ///< Of a cell.
-  /// Whether as many of the pixels that fill no cell are pressed as are a quarter of a cell.
+  /// Whether of the pixels that fill no cell at least a quarter of a cell's number are pressed.
   [[nodiscard]] bool rest_is_pressed(std::span<const std::int16_t> depth_um,
                                      const TileRows& tiles) const noexcept;
 

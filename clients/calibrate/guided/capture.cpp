@@ -159,7 +159,7 @@ SteadyFrames Capture::hold(int count, bool forcible, const Objection& objection)
       shown_(*look, against);
       restart(std::move(against));
       steadiness.restart();
-      force = false;  // what was to be taken as it is was not this
+      force = false;  // Enter was meant for what was seen before
       continue;
     }
     const int row = steadiness.add(look->cells);
