@@ -32,6 +32,7 @@ part() {
     skipped_parts+=("$name")
     verdict=' and was skipped, see above'
   else
+    rm -f "$passed"
     failed_parts+=("$name")
     verdict=' and FAILED'
   fi

@@ -43,7 +43,7 @@ logged() {
 
 # Packages of the guest itself: an init, a bus for systemctl, device nodes and their groups, the tools of
 # the tests. As in every installed Debian, nothing starts that the test does not start.
-guest_packages=(systemd systemd-sysv dbus udev kmod iproute2 procps)
+guest_packages=(systemd systemd-sysv dbus udev e2fsprogs kmod iproute2 procps)
 depends=$(wanted)
 if [ "$architecture" = amd64 ]; then
   prepare true "${guest_packages[@]}"

@@ -53,7 +53,7 @@ inside 'cd /packages
   done
   watched=$(client watch --summary --seconds 10 | tail -n 1)
   echo "$watched"
-  [[ $watched =~ :\ ([0-9]+)\ frames ]] && ((BASH_REMATCH[1] >= 10))
+  [[ $watched =~ :\ ([0-9]+)\ frames ]] && ((BASH_REMATCH[1] >= 10)) || { echo "arm64.sh: fewer than 10 frames"; exit 1; }
   kill $daemon
   wait $daemon
   trap - EXIT

@@ -15,7 +15,7 @@ sed -i '/^\[net\]/,/^\[metrics\]/{
 systemctl restart dtactd
 tls=(--host 127.0.0.1 --fingerprint "$fingerprint")
 within 120 dtactctl "${tls[@]}" --token-file /tmp/token status
-expect token dtactctl "${tls[@]}" status
+expect "asks for a token" dtactctl "${tls[@]}" status
 frames 30 5 "${tls[@]}" --token-file /tmp/token
 expect 'control' dtactctl "${tls[@]}" --token-file /tmp/token led --brightness 10
 # The check before a reload may not be able to read them.
