@@ -95,6 +95,7 @@ struct Reader::Impl {
   void scan();
   void add_scanned(Op op, std::uint64_t offset, std::uint64_t length);
   void add(const Cursor::Record& record);
+  void add_single(Op op, std::uint64_t offset);
   void add_attachment(std::uint64_t offset);
   void add_metadata(std::uint64_t offset);
 
@@ -109,9 +110,11 @@ struct Reader::Impl {
   // What the latest read() came upon, or the scan before the first.
   Unreadable chunks;
   Unreadable messages;
+  Unreadable singles;              ///< Attachments and metadata.
   std::uint64_t out_of_order = 0;  ///< Messages earlier than one before in their channel.
   std::uint64_t missing = 0;       ///< Messages that the statistics count and no chunk holds.
   std::uint64_t indexed = 0;       ///< Bytes of records that the summary's index led to.
+  std::uint64_t scanned = 0;       ///< Offset of the record at which the scan ended.
 };
 
 /// Records do not overlap: those of a whole file have no more bytes than it, however often a
@@ -144,14 +147,19 @@ void Reader::Impl::open() {
     }
   }
   const std::vector<Place> of_index = std::exchange(places, {});
-  attachments.clear();
-  metadata.clear();
+  const std::vector<AttachmentPlace> attachments_of_index = std::exchange(attachments, {});
+  const std::vector<Metadata> metadata_of_index = std::exchange(metadata, {});
+  const Unreadable singles_of_index = std::exchange(singles, {});
   indexed = 0;
   scan();
-  // Behind a record whose length is damaged the index still leads to chunks.
-  const std::uint64_t scanned = places.empty() ? 0 : places.back().offset;
-  std::ranges::copy_if(of_index, std::back_inserter(places),
-                       [scanned](const Place& place) { return place.offset > scanned; });
+  if (!damage.empty()) {
+    // Behind a record whose length is damaged the index still leads to everything else.
+    const auto behind = [this](const auto& place) { return place.offset >= scanned; };
+    std::ranges::copy_if(of_index, std::back_inserter(places), behind);
+    std::ranges::copy_if(attachments_of_index, std::back_inserter(attachments), behind);
+    if (metadata_of_index.size() > metadata.size()) metadata = metadata_of_index;
+    if (singles_of_index.count > singles.count) singles = singles_of_index;
+  }
   if (damage.empty()) damage = std::exchange(why, {});
 }
 
@@ -188,10 +196,10 @@ void Reader::Impl::read_summary(std::uint64_t footer) {
         break;
       }
       case Op::attachment_index:
-        add_attachment(entry.take<std::uint64_t>());
+        add_single(Op::attachment, entry.take<std::uint64_t>());
         break;
       case Op::metadata_index:
-        add_metadata(entry.take<std::uint64_t>());
+        add_single(Op::metadata, entry.take<std::uint64_t>());
         break;
       case Op::statistics:
         statistics = take_statistics(entry);
@@ -220,6 +228,16 @@ void Reader::Impl::add(const Cursor::Record& record) {
   }
 }
 
+/// An attachment or metadata. A damaged one costs itself alone.
+void Reader::Impl::add_single(Op op, std::uint64_t offset) {
+  try {
+    op == Op::attachment ? add_attachment(offset) : add_metadata(offset);
+  } catch (const Error& e) {
+    if (indexed > file.size()) throw;
+    singles.add(e.what());
+  }
+}
+
 void Reader::Impl::add_attachment(std::uint64_t offset) {
   const std::string record = load_indexed(offset, Op::attachment);
   Cursor fields = file.cursor(record, offset + kRecordHead);
@@ -245,6 +263,7 @@ void Reader::Impl::scan() {
   std::uint64_t offset = kMagic.size();
   try {
     for (;;) {
+      scanned = offset;
       if (offset == file.size()) file.fail(offset, "the file ends without a summary");
       const std::string head = file.load(offset, kRecordHead);
       Cursor fields = file.cursor(head, offset);
@@ -286,10 +305,8 @@ void Reader::Impl::add_scanned(Op op, std::uint64_t offset, std::uint64_t length
       break;
     }
     case Op::attachment:
-      add_attachment(offset);
-      break;
     case Op::metadata:
-      add_metadata(offset);
+      add_single(op, offset);
       break;
     default:
       // Indexes of what is read anyway, and what a later version of the format knows.
@@ -315,6 +332,10 @@ std::string Reader::damage() const {
   if (const Unreadable& messages = impl_->messages; messages.count > 0) {
     add(fmt::format("{} message(s) cannot be read, the first because of {}", messages.count,
                     messages.first));
+  }
+  if (const Unreadable& singles = impl_->singles; singles.count > 0) {
+    add(fmt::format("{} attachment(s) or metadata cannot be read, the first because of {}",
+                    singles.count, singles.first));
   }
   if (const auto& statistics = impl_->statistics; statistics && impl_->missing > 0) {
     add(fmt::format("{} of {} messages are not there", impl_->missing, statistics->messages));

@@ -427,6 +427,43 @@ TEST_F(Mcap, GoesOnBehindARecordWithoutALengthByTheIndex) {
   EXPECT_THAT(reader.damage(), AllOf(HasSubstr("1 of 3 chunks"), HasSubstr("1 of 3 messages")));
 }
 
+std::string attachment_index_of(std::uint64_t attachment) {
+  std::string fields;
+  put(fields, attachment);
+  std::string record;
+  put_record(record, Op::attachment_index, fields + std::string(40, '\0'));
+  return record;
+}
+
+// Its head or its fields: everything else is read, with the index and without.
+TEST_F(Mcap, ADamagedAttachmentCostsItselfAlone) {
+  const std::string first = chunk_of(channel_of(3, "/t") + message_of(3, 1, 10));
+  const std::string second = chunk_of(message_of(3, 2, 20));
+  const std::string whole = attachment_of("b");
+  std::string no_head = attachment_of("a");
+  no_head.replace(0, kRecordHead, kRecordHead, '\0');
+  std::string no_name = attachment_of("a");
+  no_name[kRecordHead + 16 + 3] = '\x7f';
+  const auto data = [&](const std::string& damaged) { return first + damaged + second + whole; };
+  const auto summary = [&](const std::string& damaged) {
+    const std::uint64_t attachment = kData + first.size();
+    const std::uint64_t chunk = attachment + damaged.size();
+    return channel_of(3, "/t") + index_of(kData) + index_of(chunk) +
+           attachment_index_of(attachment) + attachment_index_of(chunk + second.size()) +
+           statistics_of(2, 1, 2, 2);
+  };
+  for (const std::string& bytes :
+       {file_of(data(no_head), summary(no_head)), file_of(data(no_name), summary(no_name)),
+        file_of(data(no_name), "")}) {
+    write(bytes);
+    const Reader reader(file());
+    EXPECT_THAT(read(reader), ElementsAre(std::tuple(1, 10, "x"), std::tuple(2, 20, "x")));
+    ASSERT_THAT(reader.attachments(), SizeIs(1));
+    EXPECT_EQ(reader.attachments()[0].name, "b");
+    EXPECT_THAT(reader.damage(), HasSubstr("1 attachment(s) or metadata cannot be read"));
+  }
+}
+
 TEST_F(Mcap, AnIndexThatPointsAtARecordAgainAndAgainIsLeft) {
   MemorySink sink;
   Writer writer(sink);
