@@ -35,6 +35,7 @@ void CommandExecutor::take(bool camera_away, const Stamp& now) noexcept {
       reporter_.answer({.command = std::move(command), .outcome = *outcome, .at = now});
     } else {
       rezero_ = std::move(command);
+      rezero_since_ns_ = now.monotonic_ns;
     }
     reporter_.flush();
   }
@@ -87,6 +88,12 @@ void CommandExecutor::answer(Outcome outcome) noexcept {
 void CommandExecutor::abort_rezero() noexcept {
   tracker_.cancel_rezero();
   answer(Outcome::camera_away);
+}
+
+void CommandExecutor::limit_rezero(std::int64_t limit_ns, std::int64_t now_ns) noexcept {
+  if (!rezero_ || now_ns - rezero_since_ns_ < limit_ns) return;
+  tracker_.cancel_rezero();
+  answer(Outcome::refused_unsteady);
 }
 
 }  // namespace dtact::pipeline

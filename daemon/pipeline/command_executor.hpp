@@ -29,6 +29,9 @@ class CommandExecutor {
   void answer(Outcome outcome) noexcept;
   /// No frames arrive: aborts the re-zero in progress, if any.
   void abort_rezero() noexcept;
+  /// Refuses the re-zero in progress, if any, once it has taken `limit_ns`: light that goes on
+  /// changing would put it off without end, and all commands after it.
+  void limit_rezero(std::int64_t limit_ns, std::int64_t now_ns) noexcept;
 
   /// The calibration in use; null: uncalibrated.
   [[nodiscard]] const ActiveCalibration* active() const noexcept { return active_.get(); }
@@ -49,8 +52,9 @@ class CommandExecutor {
   DepthMaker& depth_;
   std::shared_ptr<ActiveCalibration> active_;
   std::uint64_t key_ = 0;
-  std::uint64_t generation_ = 0;   // counts the changes of the maps
-  std::optional<Command> rezero_;  // in progress
+  std::uint64_t generation_ = 0;      // counts the changes of the maps
+  std::optional<Command> rezero_;     // in progress, …
+  std::int64_t rezero_since_ns_ = 0;  // … since when
   std::uint64_t reference_sequence_ = 0;
 };
 

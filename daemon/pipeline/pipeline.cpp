@@ -239,11 +239,8 @@ Status Pipeline::status() const {
   status.skipped = exchange_.slot.replaced();
   status.fps = exchange_.statistics.fps(clock_.monotonic_ns());
   status.camera_fps = exchange_.camera_fps.load(std::memory_order_relaxed);
-  // The picture may settle for timeout_frames and be averaged for as long again; without frames
-  // the re-zero is refused after a second, or three frames.
-  const double fps =
-      status.camera_fps > 0 ? std::min(status.camera_fps, status.camera.fps) : status.camera.fps;
-  status.rezero_timeout_s = std::max(1.0, 3 / fps) + 2 * config_.reference.timeout_frames / fps;
+  status.rezero_timeout_s =
+      config_.reference.rezero_timeout_s(status.camera.fps, status.camera_fps);
   status.realtime = realtime_;
   status.cpu = cpu_;
   status.stages = exchange_.statistics.stages();

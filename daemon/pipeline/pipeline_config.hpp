@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <filesystem>
 #include <optional>
@@ -55,6 +56,15 @@ struct ReferenceRules {
   int settle_frames = 8;      ///< The mean grey has settled when over this many frames, 2 … 64, …
   double settle_grey = 0.25;  ///< … it moves by less than this many grey levels.
   int timeout_frames = 300;   ///< A picture that is not still by then counts as in contact.
+
+  /// The longest time that a re-zero takes, seconds, with a camera whose mode promises `mode_fps`
+  /// and that gives `measured_fps` (0: not known). The picture may settle for timeout_frames and be
+  /// averaged for as long again; without frames the re-zero is refused after a second, or three
+  /// frames.
+  [[nodiscard]] double rezero_timeout_s(double mode_fps, double measured_fps) const noexcept {
+    const double fps = measured_fps > 0 ? std::min(measured_fps, mode_fps) : mode_fps;
+    return std::max(1.0, 3 / fps) + 2 * timeout_frames / fps;
+  }
 };
 
 /// Settings of the capture thread and what it decides. Does not change while it runs.
