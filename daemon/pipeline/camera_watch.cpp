@@ -77,6 +77,8 @@ void CameraWatch::missed(hal::GrabStatus status, std::int64_t now_ns) noexcept {
     case hal::GrabStatus::unplugged:
     case hal::GrabStatus::ended:
       away_ = true;
+      rate_.forget();
+      skips_.forget();
       break;
     case hal::GrabStatus::damaged:
       lose(now_ns);

@@ -1,6 +1,7 @@
 #include "daemon/pipeline/capture_loop.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <utility>
 
@@ -17,6 +18,11 @@ constexpr std::chrono::milliseconds kLongestGrab{100};
 constexpr std::int64_t kAwayPauseNs = 20'000'000;
 /// For the rest of the machine, ten times a second, when the camera is faster than this thread.
 constexpr std::chrono::milliseconds kPause{10};
+/// What the newest picture shows. Of a camera that is away it says nothing.
+constexpr std::array kOfPicture{Health::image_saturated,   Health::image_dark,
+                                Health::image_noisy,       Health::image_repeated,
+                                Health::light_banded,      Health::light_drifted,
+                                Health::beyond_calibration};
 
 }  // namespace
 
@@ -28,6 +34,7 @@ CaptureLoop::CaptureLoop(const CaptureParts& parts, const PipelineConfig& config
       clock_(parts.clock),
       period_ns_(std::llround(1e9 / camera_.info().fps)),
       decode_scale_(camera_.info().decode_scale),
+      reference_(config.reference),
       timeout_(std::min<std::chrono::nanoseconds>(
           std::chrono::nanoseconds(hal::stall_ns(period_ns_)), kLongestGrab)),
       timeline_(config.light, config.light_delay_frames.value_or(camera_.info().light_delay_frames),
@@ -130,6 +137,7 @@ void CaptureLoop::process(std::int64_t now_ns) noexcept {
              .now_ns = now_ns,
              .settled = timeline_.settled_at(exposure_ns),
              .whole = area_ == whole_});
+  executor_.limit_rezero(rezero_limit_ns(), now_ns);
   const HealthSet health_flags = health(now_ns);
   out.health = health_flags;
   reporter_.contact(out);
@@ -137,6 +145,13 @@ void CaptureLoop::process(std::int64_t now_ns) noexcept {
   publish(out);  // from here on the network owns `out`
   emit(health_flags, now_ns);
   frame_.reset();
+}
+
+/// So that the answer comes within the promised time: a frame earlier.
+std::int64_t CaptureLoop::rezero_limit_ns() const noexcept {
+  const double mode_fps = 1e9 / static_cast<double>(period_ns_);
+  return std::llround(1e9 * reference_.rezero_timeout_s(mode_fps, watch_.rate().fps())) -
+         period_ns_;
 }
 
 void CaptureLoop::label(DepthFrame& out, std::int64_t exposure_ns) noexcept {
@@ -217,6 +232,7 @@ void CaptureLoop::without_frame(hal::GrabStatus status, std::int64_t asked_ns,
   watch_.missed(status, now_ns);
   if (watch_.away()) controls_moved_ = false;
   exchange_.camera_damaged.store(watch_.damaged(), std::memory_order_relaxed);
+  exchange_.camera_fps.store(watch_.rate().fps(), std::memory_order_relaxed);
   // A slow camera is silent for longer between two frames.
   const std::int64_t silence_ns = std::max(kSecond, hal::stall_ns(period_ns_));
   if (watch_.away() || watch_.silent_ns(now_ns) > silence_ns) executor_.abort_rezero();
@@ -249,6 +265,9 @@ HealthSet CaptureLoop::health(std::int64_t now_ns) const noexcept {
   const bool unusable = unusable_ && executor_.active() == nullptr;
   set.set(Health::camera_mismatch, unusable || controls_moved_ || differs);
   set.set(Health::beyond_calibration, depth_.beyond());
+  if (watch_.away()) {
+    for (const Health of_picture : kOfPicture) set.set(of_picture, false);
+  }
   set.set(Health::frames_lost, watch_.lost_lately(now_ns));
   set.set(Health::camera_fault, watch_.trouble());
   set.set(Health::camera_slow, watch_.rate().slow());

@@ -55,6 +55,7 @@ class CaptureLoop {
   void without_frame(hal::GrabStatus status, std::int64_t asked_ns, std::int64_t now_ns) noexcept;
   void emit(HealthSet health, std::int64_t now_ns) noexcept;
   [[nodiscard]] Stamp stamp(std::int64_t at_ns) const noexcept;
+  [[nodiscard]] std::int64_t rezero_limit_ns() const noexcept;
   [[nodiscard]] State state() const noexcept;
   [[nodiscard]] HealthSet health(std::int64_t now_ns) const noexcept;
 
@@ -64,6 +65,7 @@ class CaptureLoop {
   base::Clock& clock_;
   const std::int64_t period_ns_;
   const int decode_scale_;  // of the JPEGs to the frames
+  const ReferenceRules reference_;
   const std::chrono::nanoseconds timeout_;
 
   LightTimeline timeline_;  // before the tracker, which reads it

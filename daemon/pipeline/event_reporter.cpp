@@ -19,6 +19,8 @@ bool EventReporter::push(T&& event) noexcept {
 }
 
 void EventReporter::contact(const DepthFrame& frame) noexcept {
+  // Nobody is there to receive its end.
+  if (frame.contact_absence == ContactAbsence::unasked) in_contact_ = false;
   const bool in_contact = frame.contact.in_contact;
   if (frame.contact_absence != ContactAbsence::none || in_contact == in_contact_) return;
   const Stamp at{frame.camera.sequence, frame.camera.timestamp_ns, frame.wall_ns};

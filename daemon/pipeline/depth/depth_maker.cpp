@@ -22,6 +22,8 @@ void DepthMaker::set_light(double factor) noexcept { maps_->set_light(factor); }
 
 void DepthMaker::skip(DepthFrame& out, ContactAbsence why) noexcept {
   beyond_ = false;
+  // What nobody asks for may last for hours: the next client begins without contact.
+  if (why == ContactAbsence::unasked) contact_ = ContactDetector(config_.contact);
   out.has_depth = false;
   out.contact_absence = why;
   out.contact = {};

@@ -34,7 +34,8 @@ class DepthMaker {
   /// it.
   void make(const hal::LumaView& luma, const ReferenceTracker& tracker, bool judged,
             DepthFrame& out) noexcept;
-  /// Makes no depth of this frame: the contact state stays, and `out` reports no contact.
+  /// Makes no depth of this frame: `out` reports no contact. The contact state stays unless nobody
+  /// asks for it.
   void skip(DepthFrame& out, ContactAbsence why) noexcept;
 
   [[nodiscard]] bool in_contact() const noexcept { return contact_.in_contact(); }

@@ -3,7 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <exception>
+#include <system_error>
 #include <utility>
 
 namespace dtact::pipeline {
@@ -37,9 +39,12 @@ void ReferenceWriter::write() {
   try {
     save_reference(pending_, *calibration_, folder_);
     has_written_.store(true, std::memory_order_relaxed);
+  } catch (const std::system_error& e) {
+    const bool full = e.code() == std::errc::no_space_on_device || e.code().value() == EDQUOT;
+    failure = fmt::format("the last good reference is not kept ({}): {}", e.what(),
+                          full ? "free some space there" : "make the state folder writable");
   } catch (const std::exception& e) {
-    failure = fmt::format(
-        "the last good reference is not kept ({}): make the state folder writable", e.what());
+    failure = fmt::format("the last good reference is not kept ({})", e.what());
   }
   calibration_.reset();
   const std::scoped_lock lock(mutex_);

@@ -241,6 +241,66 @@ TEST(CaptureLoop, WhatIsSaidOfControlsGoesWithTheCamera) {
   EXPECT_FALSE(loop.health().has(Health::camera_mismatch));
 }
 
+// Before: for as long as the camera was away, what its last picture showed was said to be so now.
+TEST(CaptureLoop, WhatIsSaidOfThePictureGoesWithTheCamera) {
+  SteppedLoop loop;
+  loop.begin(toy_calibration());
+  ASSERT_TRUE(loop.until_fresh());
+  loop.camera.scene.press_mm = 3;
+  loop.camera.slower = 2;
+  ASSERT_TRUE(loop.until([&] {
+    return loop.health().has(Health::camera_slow) && loop.health().has(Health::beyond_calibration);
+  }));
+  EXPECT_GT(loop.exchange.camera_fps.load(), 0);
+  loop.camera.status = hal::GrabStatus::unplugged;
+  loop.step(60);
+  EXPECT_TRUE(loop.health().has(Health::camera_fault));
+  EXPECT_FALSE(loop.health().has(Health::camera_slow));
+  EXPECT_FALSE(loop.health().has(Health::beyond_calibration));
+  EXPECT_EQ(loop.exchange.camera_fps.load(), 0);
+}
+
+// Each change of the light begins the wait anew. Before: the re-zero was never answered, and no
+// command after it was taken.
+TEST(CaptureLoop, LightThatGoesOnChangingPutsNoRezeroOffWithoutEnd) {
+  SteppedLoop loop;
+  loop.config.reference.timeout_frames = 30;
+  loop.begin(toy_calibration());
+  ASSERT_TRUE(loop.until_fresh());
+  ASSERT_TRUE(loop.submit(Rezero{true}));
+  ASSERT_TRUE(loop.submit(SetReconstruction{}));
+  const double limit_s = loop.config.reference.rezero_timeout_s(60, 60);
+  const int frames = static_cast<int>(60 * limit_s) + 1;
+  for (int i = 0; i < frames; ++i) {
+    if (i % 5 == 0) loop.loop->tracker().exposure_changed();
+    (void)loop.step();
+  }
+  const auto answers = loop.all<CommandDone>();
+  ASSERT_EQ(answers.size(), 2U);
+  EXPECT_EQ(answers[0].outcome, Outcome::refused_unsteady);
+  EXPECT_TRUE(std::holds_alternative<SetReconstruction>(answers[1].command.what));
+}
+
+// Before: the first frame of a client that came hours later was still in contact.
+TEST(CaptureLoop, ContactThatNobodyListenedToIsForgotten) {
+  SteppedLoop loop;
+  loop.begin(toy_calibration());
+  ASSERT_TRUE(loop.until_fresh());
+  loop.camera.scene.press_mm = 1;
+  loop.step(10);
+  ASSERT_TRUE(loop.frame->contact.in_contact);
+  loop.exchange.wanted = Wanted{};
+  loop.step(5);
+  loop.camera.scene.press_mm = 0;
+  loop.step(5);
+  const std::size_t events = loop.all<ContactChanged>().size();
+  loop.exchange.wanted = Wanted{.contact = true, .depth = true};
+  ASSERT_TRUE(loop.until([&] { return loop.frame->has_depth; }, 2));
+  EXPECT_FALSE(loop.frame->contact.in_contact);
+  loop.step(5);
+  EXPECT_EQ(loop.all<ContactChanged>().size(), events) << "nobody had heard of its begin";
+}
+
 TEST(CaptureLoop, EveryFrameReportsTheForceThatTheCalibrationKnows) {
   auto calibration = toy_calibration();
   auto model = std::make_shared<recon::Model>(*calibration->model);
