@@ -105,6 +105,12 @@ void CalibrationCommands::get(const Requester& requester, const v1::GetCalibrati
                             "depth and send it with dtactctl calibration upload, or take one "
                             "that dtactctl calibration list shows");
   }
+  if (!number && changing_) return requester.refuse(v1::ERROR_BUSY, kBusy);
+  if (!number && !in_use_) {
+    return requester.refuse(v1::ERROR_STORAGE,
+                            "the calibration in use could not be written, so its files are not "
+                            "kept: make room in the state folder and upload it again");
+  }
   if (!number) number = in_use_;
   if (reading_ >= kMaxReading) return requester.refuse(v1::ERROR_BUSY, kBusy);
   ++reading_;

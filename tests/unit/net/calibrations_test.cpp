@@ -192,6 +192,10 @@ TEST(Upload, ThatCouldNotBeStoredIsInUseUnderNoNumber) {
   EXPECT_EQ(client.request(upload("x", "unwritable")).error().code(), v1::ERROR_STORAGE);
   EXPECT_EQ(in_use(client), 999U);
   EXPECT_EQ(current_of(client), 1U);
+  // Before: the current one's files, of which no depth is made.
+  const auto reply = client.request(get_calibration());
+  EXPECT_EQ(reply.error().code(), v1::ERROR_STORAGE);
+  EXPECT_THAT(reply.error().message(), HasSubstr("could not be written"));
   EXPECT_TRUE(client.request(upload("x", "good")).has_done());
   EXPECT_EQ(in_use(client), 4U);
   EXPECT_EQ(current_of(client), 4U);
