@@ -60,6 +60,7 @@ class Watch {
     if (options_.draw) screen_.emplace();
     v1::Subscribe subscription = options_.draw ? drawn_stream(client_) : client::depth_stream();
     subscription.set_summary(options_.summary);
+    if (options_.summary) subscription.set_depth(v1::DEPTH_NONE);
     client_.subscribe(subscription);
     start_ns_ = now();
     try {
@@ -91,6 +92,8 @@ class Watch {
       if (now() < next_line_ns) continue;
       show();
       next_line_ns += interval_ns;
+      // After a pause (Ctrl-Z, a terminal that is not read) the lines left out are not made up for.
+      if (next_line_ns <= now()) next_line_ns = now() + interval_ns;
     }
   }
 

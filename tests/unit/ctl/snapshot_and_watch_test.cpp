@@ -106,6 +106,9 @@ TEST(Watch, PrintsJson) {
   EXPECT_EQ(result.code, 0) << result.error;
   EXPECT_THAT(result.out,
               AllOf(StartsWith("{\"summary\":false,"), HasSubstr("\n{\"summary\":true,")));
+  EXPECT_EQ(result.out.find("\"depth\":{"), std::string::npos) << "no map was asked for";
+  const auto whole = ctl(rig, {"watch", "--seconds", "1.5", "--json"});
+  EXPECT_THAT(whole.out, HasSubstr("\"depth\":{"));
 }
 
 TEST(Watch, ReturnsFourWhenDepthIsTooSlow) {
