@@ -44,6 +44,8 @@ struct Options {
   bool insecure = false;
   /// Unset: a lost connection is an error and makes the client unusable.
   std::optional<Reconnect> reconnect{};
+  /// Frames kept while a request waits for its answer, 1 or more; the oldest yield.
+  std::size_t kept_frames = 4;
 };
 
 /// Returns the first line of a file. Throws Error if other users may read the file, or if the line

@@ -14,9 +14,6 @@
 namespace dtact::client {
 namespace {
 
-/// Frames kept while a request waits for its answer; the oldest yield.
-constexpr std::size_t kKeptFrames = 4;
-
 /// Throws what an error of the daemon is to the caller.
 [[noreturn]] void refuse(const v1::Reply& reply) {
   const v1::Error& error = reply.error();
@@ -159,7 +156,7 @@ void Session::keep(v1::ServerMessage& message) {
   if (!message.has_frame()) return;
   last_sequence_ = message.frame().sequence();
   const auto is_frame = [](const Item& item) { return std::holds_alternative<v1::Frame>(item); };
-  if (static_cast<std::size_t>(std::ranges::count_if(inbox_, is_frame)) >= kKeptFrames) {
+  if (static_cast<std::size_t>(std::ranges::count_if(inbox_, is_frame)) >= options_.kept_frames) {
     inbox_.erase(std::ranges::find_if(inbox_, is_frame));
   }
   inbox_.emplace_back(std::move(*message.mutable_frame()));

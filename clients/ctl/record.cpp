@@ -64,7 +64,7 @@ class Recording {
  public:
   Recording(const Context& context, const RecordOptions& options)
       : options_(options),
-        client_(context.target),
+        client_(patient(context.target)),
         sink_(options.output, options.force),
         recorder_(sink_, {context.target.program, options.pictures_hz}) {}
 
@@ -107,6 +107,12 @@ class Recording {
   }
 
  private:
+  /// Frames are kept while a changed calibration's or reference's files come.
+  static client::Options patient(client::Options target) {
+    target.kept_frames = 300;
+    return target;
+  }
+
   void take(client::Item item, const v1::Status& status) {
     if (auto* event = std::get_if<v1::Event>(&item)) {
       const bool another = event->has_calibration() || event->has_reference();
@@ -138,12 +144,20 @@ class Recording {
       put(recording::kReferencePng, "image/png", files.reference_png());
     } catch (const client::Refused&) {  // NOLINT(bugprone-empty-catch)
       // Uncalibrated, or busy with another one, which an event will report.
+    } catch (const client::TimeoutError& e) {
+      missing("calibration", e);
     }
     try {
       put(recording::kCurrentReferencePng, "image/png", client_.reference().png());
     } catch (const client::Refused&) {  // NOLINT(bugprone-empty-catch)
       // None is taken yet; its event will come.
+    } catch (const client::TimeoutError& e) {
+      missing("reference", e);
     }
+  }
+
+  static void missing(const char* what, const std::exception& why) {
+    std::cerr << "the " << what << " in use is not in the recording: " << why.what() << '\n';
   }
 
   void put(const char* name, const char* media_type, const std::string& data) {
