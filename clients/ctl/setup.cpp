@@ -52,6 +52,7 @@ struct SetupOptions {
   std::string camera;
   std::string mode;
   std::string board;
+  std::string folder;  ///< Empty: chosen.
   std::string radius_mm;
   std::string mm_per_px;
   std::string ruler;
@@ -367,6 +368,7 @@ class Setup {
   /// Where guided goes on with a session that ended early. One that has its calibration is not
   /// taken up again: its presses are of the gel of that time.
   [[nodiscard]] std::string work_folder() const {
+    if (!options_.folder.empty()) return options_.folder;
     std::string name = "dtact-calibration";
     if (const std::size_t at = options_.unit.find('@'); at != std::string::npos) {
       name += "-" + options_.unit.substr(at + 1);
@@ -382,7 +384,8 @@ class Setup {
     Command command = {cli::sibling("dtact-calibrate")};
     add_target(command);
     command.emplace_back("guided");
-    command.insert(command.end(), {"--folder", work_folder()});
+    const std::string folder = work_folder();
+    command.insert(command.end(), {"--folder", folder});
     const auto add = [&command](const std::string& option, const std::string& value) {
       if (!value.empty()) command.insert(command.end(), {option, value});
     };
@@ -404,7 +407,13 @@ class Setup {
     add("--ruler", options_.ruler);
     add("--lens", options_.lens);
     add("--crop", options_.crop);
-    if (run_program(command, context_.out) != 0) stop("there is no calibration yet");
+    if (run_program(command, context_.out) == 0) return;
+    const std::string made = folder + "/calibration";
+    if (fs::exists(made)) {
+      stop(fmt::format("{} is made but not in use: dtactctl calibration upload {}", made, made));
+    }
+    stop(fmt::format("there is no calibration yet; what was taken is in {} (--folder: another one)",
+                     folder));
   }
 
   void watch() const {
@@ -462,6 +471,11 @@ void add_setup(CLI::App& app, Context& context) {
                    "Board's configuration whose camera and ring are taken: a file, or a name in "
                    "/usr/share/doc/dtactd/examples/boards (default: of the board that this is)")
       ->type_name("NAME");
+  command
+      ->add_option("--folder", options->folder,
+                   "Where calibrate keeps what it takes, and goes on after an early end (default: "
+                   "dtact-calibration here)")
+      ->type_name("DIR");
   command
       ->add_option("--radius-mm", options->radius_mm,
                    "See dtact-calibrate guided; asked for if not given")
