@@ -75,11 +75,12 @@ void rename(const Options& options) {
   const fs::path to = perceive::file_of(options.folder, options.new_name);
   // In one step: a lesson, or another rename, may store that name at the same time.
   if (::renameat2(AT_FDCWD, from.c_str(), AT_FDCWD, to.c_str(), RENAME_NOREPLACE) == 0) return;
-  if (errno == EEXIST || (errno == EINVAL && fs::exists(to))) {
+  const int error = errno;
+  if (error == EEXIST || (error == EINVAL && fs::exists(to))) {
     throw std::runtime_error(fmt::format("{} exists already: forget it first", options.new_name));
   }
-  if (errno != EINVAL) {
-    throw std::system_error(errno, std::generic_category(), "cannot rename " + from.string());
+  if (error != EINVAL) {
+    throw std::system_error(error, std::generic_category(), "cannot rename " + from.string());
   }
   fs::rename(from, to);  // the file system knows no such step
 }

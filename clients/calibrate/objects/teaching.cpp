@@ -164,23 +164,24 @@ std::vector<TouchMap> take_presses(const Lesson& lesson, const client::Options& 
   return presses;
 }
 
-/// Each press against the others: what it would be taken for without itself.
+/// Each press against the others: what it would be taken for without itself, by the recogniser's
+/// rule: the object of which it is nearest as a share of the radius, and no object beyond it.
 std::string left_out(const TaughtObject& object, const std::vector<TaughtObject>& others) {
   std::map<std::string, int> like;
   int alone = 0;
   for (std::size_t i = 0; i < object.features.size(); ++i) {
-    const double own = perceive::nearest(object, object.features[i], i);
+    const double own = perceive::nearest(object, object.features[i], i) / object.radius;
     const TaughtObject* best = nullptr;
     double least = own;
     for (const TaughtObject& other : others) {
-      const double there = perceive::nearest(other, object.features[i]);
-      if (there >= least) continue;
+      const double there = perceive::nearest(other, object.features[i]) / other.radius;
+      if (there > 1 || there >= least) continue;
       least = there;
       best = &other;
     }
     if (best != nullptr) {
       ++like[best->name];
-    } else if (own > object.radius) {
+    } else if (own > 1) {
       ++alone;
     }
   }

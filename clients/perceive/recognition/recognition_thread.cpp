@@ -1,10 +1,11 @@
 #include "clients/perceive/recognition/recognition_thread.hpp"
 
+#include <sys/stat.h>
+
 #include <algorithm>
 #include <chrono>
 #include <filesystem>
 #include <memory>
-#include <system_error>
 #include <utility>
 
 #include "clients/perceive/recognition/taught_objects.hpp"
@@ -68,8 +69,10 @@ void RecognitionThread::read_taught() {
   std::shared_ptr<const std::vector<TaughtObject>> taught;
   try {
     for (std::string& name : taught_names(folder_)) {
-      std::error_code damaged;
-      const auto changed = std::filesystem::last_write_time(file_of(folder_, name), damaged);
+      struct stat status{};
+      (void)::stat(file_of(folder_, name).c_str(), &status);
+      const std::int64_t changed =
+          std::int64_t{status.st_ctim.tv_sec} * 1'000'000'000 + status.st_ctim.tv_nsec;
       files.emplace_back(std::move(name), changed);
     }
     if (files == files_) return;

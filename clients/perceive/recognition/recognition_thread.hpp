@@ -55,8 +55,9 @@ class RecognitionThread {
   void read_taught();
 
   const std::filesystem::path folder_;
-  /// Name and last change of each file that was read. The thread's alone, as the next one.
-  std::vector<std::pair<std::string, std::filesystem::file_time_type>> files_;
+  /// Name and last change of each file that was read, that of its owner and rights included,
+  /// nanoseconds since 1970. The thread's alone, as the next one.
+  std::vector<std::pair<std::string, std::int64_t>> files_;
   Network network_;
   mutable std::mutex mutex_;  ///< Guards all members below but the thread.
   std::condition_variable_any changed_;

@@ -110,14 +110,16 @@ std::vector<TouchMap> read_presses(const std::filesystem::path& folder, const st
     throw std::runtime_error(
         fmt::format("{} has a name that is not UTF-8: rename it", base::as_utf8(file.string())));
   }
+  const auto fail = [&name](const std::string& why) {
+    throw std::runtime_error(fmt::format("{}: forget {}, or teach it again", why, name));
+  };
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(file, error)) fail(file.string() + " is not a file");
+  const std::string bytes = base::read_file(file);  // what cannot be read may be whole
   try {
-    std::error_code error;
-    if (!std::filesystem::is_regular_file(file, error)) {
-      throw std::runtime_error(file.string() + " is not a file");
-    }
-    return decode_presses(base::read_file(file), file.string());
+    return decode_presses(bytes, file.string());
   } catch (const std::exception& e) {
-    throw std::runtime_error(fmt::format("{}: forget {}, or teach it again", e.what(), name));
+    fail(e.what());
   }
 }
 
