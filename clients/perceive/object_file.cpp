@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <stdexcept>
+#include <system_error>
 
 #include "clients/geometry/mesh_file.hpp"
 #include "hal/base/atomic_file.hpp"
@@ -12,6 +13,11 @@ namespace dtact::perceive {
 
 std::shared_ptr<const ObjectModel> load_object(const std::filesystem::path& file,
                                                const std::string& unit) {
+  std::error_code unknown;
+  if (std::filesystem::file_size(file, unknown) > kMaxMeshBytes && !unknown) {
+    throw std::runtime_error(fmt::format("{}: larger than {} MiB: simplify the mesh", file.string(),
+                                         kMaxMeshBytes >> 20U));
+  }
   const Mesh mesh = parse_mesh(base::read_file(file, kMaxMeshBytes), file.string());
   try {
     return std::make_shared<const ObjectModel>(

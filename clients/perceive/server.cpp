@@ -99,7 +99,10 @@ void Server::update_want() {
   extras_ = {.pose = demand.pose(), .recognition = demand.recognition()};
   const v1::Subscribe wanted = demand.subscription();
   // Without frames the end of a contact is not seen: the next one may be another object's.
-  if (!wanted.summary()) maker_.release();
+  if (!wanted.summary()) {
+    maker_.release();
+    damage_.clear();  // nor is it seen when frames can be read again
+  }
   if (upstream_ == nullptr || wanted.SerializeAsString() == wanted_.SerializeAsString()) return;
   wanted_ = wanted;
   upstream_->want(wanted);

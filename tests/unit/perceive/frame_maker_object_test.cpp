@@ -3,6 +3,7 @@
 
 #include <chrono>
 #include <filesystem>
+#include <fstream>
 #include <thread>
 
 #include "clients/perceive/frame_maker.hpp"
@@ -106,6 +107,16 @@ TEST(FrameMakerOfAnObject, ItsNameIsUtf8) {
   const auto object = load_object(file, "mm");
   std::filesystem::remove(file);
   EXPECT_TRUE(object->name.ends_with("Schl?ssel")) << object->name;
+}
+
+TEST(FrameMakerOfAnObject, AShapeThatIsTooLargeIsRefusedWithItsLimit) {
+  const std::filesystem::path file = fakes::own_path("large.stl");
+  std::ofstream(file).close();
+  std::filesystem::resize_file(file, (64U << 20U) + 1);
+  EXPECT_THAT([&] { (void)load_object(file, "mm"); },
+              testing::ThrowsMessage<std::runtime_error>(
+                  testing::HasSubstr("larger than 64 MiB: simplify the mesh")));
+  std::filesystem::remove(file);
 }
 
 // Another calibration may place the same pixels elsewhere, and a daemon that was away does not
