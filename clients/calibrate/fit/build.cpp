@@ -111,9 +111,10 @@ PressChoices choose(const BallPress& press, recon::Model& model, SettledPress& s
   }
   const ChosenAsymmetry gain = press_asymmetry_of(under);
   chosen.light = {false, lean_of(settled), lean_of(under)};
-  if (!(chosen.light->plain_per_mm > kLeans &&
+  const auto& plain_mm = chosen.press_asymmetry.left_out_mm;
+  if (!(plain_mm && gain.left_out_mm && chosen.light->plain_per_mm > kLeans &&
         chosen.light->shared_per_mm < kLeftByTheLight * chosen.light->plain_per_mm &&
-        gain.left_out_mm[0] <= chosen.press_asymmetry.left_out_mm[0])) {
+        (*gain.left_out_mm)[0] <= (*plain_mm)[0])) {
     return chosen;
   }
   chosen.light->shared = true;

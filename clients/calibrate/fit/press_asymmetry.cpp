@@ -184,12 +184,13 @@ ChosenAsymmetry choose_asymmetry(std::span<const PressSample> samples, double ba
                                  double sector_deg) {
   ChosenAsymmetry chosen;
   if (samples.size() < kFewest) return chosen;
+  auto& left_out_mm = chosen.left_out_mm.emplace();
   auto best = AsymmetryOrder::none;
   double least = 0;
   for (const AsymmetryOrder order :
        {AsymmetryOrder::none, AsymmetryOrder::plane, AsymmetryOrder::quadratic}) {
     const double error = left_out_error(samples, ball_radius_mm, order, sector_deg);
-    chosen.left_out_mm[static_cast<std::size_t>(order)] = error;
+    left_out_mm[static_cast<std::size_t>(order)] = error;
     if (order != AsymmetryOrder::none &&
         error > least - std::max(kMinImprovement, kImprovement * least)) {
       continue;
@@ -202,10 +203,11 @@ ChosenAsymmetry choose_asymmetry(std::span<const PressSample> samples, double ba
 }
 
 std::string ChosenAsymmetry::describe() const {
+  if (!left_out_mm) return "press: its contact is too small to tell a gain of its own: it has none";
   std::string text = fmt::format(
       "press: sectors that were left out are {:.4f} mm off the sphere with no gain of its own, "
       "{:.4f} with a plane, {:.4f} with a quadratic: ",
-      left_out_mm[0], left_out_mm[1], left_out_mm[2]);
+      (*left_out_mm)[0], (*left_out_mm)[1], (*left_out_mm)[2]);
   if (gain.order == AsymmetryOrder::none) return text + "it has none";
   const double tilt = 100 * std::hypot(gain.factors[0], gain.factors[1]);
   text += fmt::format("a plane of {:.1f} % a mm", tilt);

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -58,10 +59,10 @@ struct PressSample {
                                            double ball_radius_mm, AsymmetryOrder order);
 
 /// A gain, and the errors that chose its order: the mean distance from the sphere, mm, in the
-/// sectors that the fit left out, for each order.
+/// sectors that the fit left out, for each order. Unset: the contact is too small to leave any out.
 struct ChosenAsymmetry {
   PressAsymmetry gain;
-  std::array<double, 3> left_out_mm = {};
+  std::optional<std::array<double, 3>> left_out_mm;
 
   /// A description of one sentence.
   [[nodiscard]] std::string describe() const;

@@ -79,8 +79,12 @@ struct Settled {
   const Lattice* lattice = nullptr;
   std::vector<Mark> marks;
   std::vector<std::string> missing;
-  Lens lens;          ///< Of 12 parameters, through the marks.
+  Lens lens;          ///< Of 12 parameters, through the marks; only where there are so many.
   double rms_mm = 0;  ///< Their residual for it.
+
+  [[nodiscard]] bool has_lens() const {
+    return marks.size() >= static_cast<std::size_t>(parameters(LensModel::radial2));
+  }
 };
 
 /// The median of the heights around a place of the lattice.
@@ -178,9 +182,11 @@ Settled settle(const Darkening& image, const Lattice& lattice, const Board& boar
         settled.missing.push_back(name_of(row, col));
       }
     }
-    if (2 * settled.missing.size() > lattice.places.size()) return settled;
+    if (2 * settled.missing.size() > lattice.places.size() || !settled.has_lens()) return settled;
     lens = fit_lens(settled.marks, LensModel::radial2);
-    if (drop_strays(settled, lens, board)) lens = fit_lens(settled.marks, LensModel::radial2);
+    if (!drop_strays(settled, lens, board)) continue;
+    if (!settled.has_lens()) return settled;
+    lens = fit_lens(settled.marks, LensModel::radial2);
   }
   settled.lens = lens;
   settled.rms_mm = rms(residuals_mm(lens, settled.marks));
@@ -321,6 +327,12 @@ std::vector<Lattice> lattices_of(const cv::Mat1f& image, const Board& board) {
 }  // namespace
 
 PinPress find_pins(const cv::Mat1f& reference, const cv::Mat1f& frame, const Board& board) {
+  const int fewest = parameters(LensModel::radial2);
+  if (board.rows * board.cols < fewest) {
+    throw std::runtime_error(
+        fmt::format("board: {}x{} pins are too few for a lens: at least {} are needed", board.rows,
+                    board.cols, fewest));
+  }
   constexpr std::size_t kTries = 30;
   constexpr int kMayMiss = 10;  // one in ten: a lattice that is a row off misses more
   const Darkening image = relative_darkening(reference, frame);
@@ -342,6 +354,7 @@ PinPress find_pins(const cv::Mat1f& reference, const cv::Mat1f& frame, const Boa
                     "the same with the board pressed in, and the numbers of rows and columns",
                     board.rows, board.cols));
   }
+  if (!best.has_lens()) refuse(best.missing, board.rows * board.cols);
   refuse_exchanged(image, best, board);
   refuse_shifted(image, best, board);
   const int pins = board.rows * board.cols;

@@ -154,7 +154,8 @@ TEST(PressAsymmetry, ATinyContactReportsNothing) {
   const std::vector<PressSample> few(199, {0.1, 0.1, 10});
   const ChosenAsymmetry chosen = choose_asymmetry(few, 4);
   EXPECT_EQ(chosen.gain.order, AsymmetryOrder::none);
-  EXPECT_THAT(chosen.left_out_mm, Each(0.0));
+  EXPECT_FALSE(chosen.left_out_mm);
+  EXPECT_THAT(chosen.describe(), HasSubstr("too small to tell"));
 }
 
 TEST(PressAsymmetry, SaysInWordsWhatItChoseAndWhy) {

@@ -172,6 +172,19 @@ TEST(Pins, MoreThanATenthMissingIsRefused) {
                   AllOf(HasSubstr("7 of 63 pins not found"), HasSubstr("row 3, column 3"))));
 }
 
+// A lens takes twelve marks. Before: "too few points".
+TEST(Pins, MissingOnesOfASmallBoardAreNamed) {
+  Scene scene;
+  scene.board = {3, 4, 3.5};
+  scene.missing = {{1, 2}};
+  EXPECT_THAT([&] { (void)scene.find(); },
+              ThrowsMessage<std::runtime_error>(
+                  AllOf(HasSubstr("1 of 12 pins not found"), HasSubstr("row 2, column 3"))));
+  scene.board = {3, 3, 3.5};
+  EXPECT_THAT([&] { (void)scene.find(); },
+              ThrowsMessage<std::runtime_error>(HasSubstr("too few for a lens")));
+}
+
 TEST(Pins, ABoardThatIsARowShortIsRefused) {
   Scene scene;
   for (int col = 0; col < 9; ++col) scene.missing.insert({6, col});
