@@ -51,6 +51,18 @@ class Aio(unittest.IsolatedAsyncioTestCase):
                 lights = await asyncio.gather(*(s.set_light(brightness=b) for b in range(20)))
                 self.assertEqual([light.brightness for light in lights], list(range(20)))
 
+    async def test_a_cancelled_requests_answer_is_not_kept(self):
+        with FakeDaemon() as daemon:
+            async with dtact.aio.connect(daemon.address) as s:
+                def late(request, reply):
+                    time.sleep(0.2)
+                    return True
+                daemon.answers["get_status"] = late
+                with self.assertRaises(builtins.TimeoutError):
+                    await asyncio.wait_for(s.status(), 0.05)
+                await s.ping()
+                self.assertEqual(s._conversation.answers, {})
+
     async def test_a_slow_reader_gets_the_newest(self):
         with FakeDaemon() as daemon:
             async with dtact.aio.connect(daemon.address) as s:

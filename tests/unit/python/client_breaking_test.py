@@ -1,4 +1,5 @@
 """The blocking client when the connection ends."""
+import errno
 import os
 import signal
 import tempfile
@@ -24,6 +25,17 @@ class Breaking(unittest.TestCase):
             with self.assertRaisesRegex(dtact.ConnectionError, "ended the connection"):
                 s.status()
             self.assertEqual(daemon.connections, 1)
+
+    def test_a_link_that_the_kernel_gives_up_is_lost(self):
+        """Nothing answers any more: recv() ends with a time-out that the client did not set."""
+        with FakeDaemon() as daemon, dtact.connect(daemon.address) as s:
+            daemon.pushed = [frame(1)]
+            self.assertEqual(next(s.frames()).sequence, 1)
+            gone = mock.Mock(wraps=s._link._socket)
+            gone.recv_into.side_effect = [BlockingIOError(), TimeoutError(errno.ETIMEDOUT, "timed out")]
+            s._link._socket = gone
+            with self.assertRaises(dtact.ConnectionError):
+                list(s.events())
 
     def test_the_daemons_reason_is_given(self):
         with FakeDaemon() as daemon, dtact.connect(daemon.address) as s:

@@ -260,11 +260,11 @@ class Client(Session):
                             self._lost(link.reason() or self._ended())
                         raise self._broken
                     await link.changed()
-        except builtins.TimeoutError as e:
-            if isinstance(e, Error):
-                raise
+        except BaseException as e:  # A cancelled task's answer would be kept for ever.
             conversation.forget(number)
-            raise TimeoutError("the daemon gave no answer in time: look at journalctl -u dtactd") from e
+            if isinstance(e, builtins.TimeoutError) and not isinstance(e, Error):
+                raise TimeoutError("the daemon gave no answer in time: look at journalctl -u dtactd") from e
+            raise
         return self._answer(conversation.answers.pop(number), request)
 
     async def _wait(self, take: Callable[[Conversation], _Item | None],

@@ -193,12 +193,15 @@ class Client(Session):
             self._link.send(data, deadline)
         except OSError as e:
             self._lost(self._broke(e))
-        while number not in self._conversation.answers:
-            if self._link is None:
-                raise self._broken
-            if not self._read(deadline):
-                self._conversation.forget(number)
-                raise TimeoutError("the daemon gave no answer in time: look at journalctl -u dtactd")
+        try:
+            while number not in self._conversation.answers:
+                if self._link is None:
+                    raise self._broken
+                if not self._read(deadline):
+                    raise TimeoutError("the daemon gave no answer in time: look at journalctl -u dtactd")
+        except BaseException:  # Ctrl-C too.
+            self._conversation.forget(number)
+            raise
         return self._answer(self._conversation.answers.pop(number), request)
 
     def _wait(self, take: Callable[[Conversation], _Item | None],

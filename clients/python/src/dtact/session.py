@@ -72,7 +72,8 @@ class Session:
     :param reconnect: connect and subscribe again when the connection breaks while frames or events
         are awaited. A pending request then fails with ConnectionError.
     :param kept_frames: number of newest frames kept until they are taken. 1: a slow reader gets the
-        newest frame only; more: a queue, from the oldest that is kept.
+        newest frame only; more: a queue, from the oldest that is kept, of what comes while a call
+        waits. Between calls nothing is read but by the asyncio client.
     """
 
     def __init__(

@@ -147,7 +147,12 @@ class Link:
         self._socket.settimeout(None if wait == math.inf else wait)
         try:
             return self._socket.recv_into(buffer)
-        except (BlockingIOError, TimeoutError, ssl.SSLWantReadError):
+        except TimeoutError as e:
+            # With a number it is the kernel's: the other side has gone without a word.
+            if e.errno is not None:
+                raise
+            return -1
+        except (BlockingIOError, ssl.SSLWantReadError):
             return -1
         except (ConnectionResetError, ssl.SSLEOFError):
             return 0
