@@ -162,10 +162,16 @@ void Sensor::on_request(const std::shared_ptr<net::Session>& session,
 
 void Sensor::subscribe(const std::shared_ptr<net::Session>& session, std::uint64_t id,
                        const v1::Subscribe& request) {
-  const auto answered = [weak = std::weak_ptr(session), id, request](v1::Reply reply) {
+  const std::uint64_t number = ++viewers_[session.get()].asked;
+  const auto answered = [this, weak = std::weak_ptr(session), id, request,
+                         number](v1::Reply reply) {
     const auto viewer = weak.lock();
     if (viewer == nullptr) return;
-    if (!reply.has_error()) viewer->subscribe(every_frame(request));
+    std::uint64_t& accepted = viewers_[viewer.get()].accepted;
+    if (!reply.has_error() && number > accepted) {
+      accepted = number;
+      viewer->subscribe(every_frame(request));
+    }
     send(*viewer, id, std::move(reply));
   };
   source_->subscribe(

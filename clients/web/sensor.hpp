@@ -57,6 +57,9 @@ class Sensor : public net::SessionHost, public std::enable_shared_from_this<Sens
     WireTransport* transport = nullptr;  ///< The session's.
     std::uint32_t waiting = 0;           ///< RelayedFrame::parts of the frame that waits.
     net::TokenBucket requests{kMaxRequestsPerS, kMaxRequestsPerS};
+    // Its Subscribes, counted: answers come in any order, and the newest one holds.
+    std::uint64_t asked = 0;
+    std::uint64_t accepted = 0;
   };
 
   void on_changed();

@@ -38,13 +38,14 @@ cli::GuidedStart parse_start(const std::string& text) {
   return start;
 }
 
-/// The youngest folder of the sensor's sessions.
+/// The youngest folder of the sensor's sessions that have got as far as the reference.
 std::optional<fs::path> last_folder(const fs::path& work, const std::string& name) {
   std::optional<fs::path> last;
   std::error_code none;
   for (const auto& entry : fs::directory_iterator(work, none)) {
     const std::string found = entry.path().filename().string();
     if (found.size() != name.size() + 16 || !found.starts_with(name + "-")) continue;
+    if (!fs::exists(entry.path() / "reference" / "sensor.toml", none)) continue;
     if (!last || last->filename() < entry.path().filename()) last = entry.path();
   }
   return last;
