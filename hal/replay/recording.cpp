@@ -12,6 +12,7 @@
 
 #include "hal/base/atomic_file.hpp"
 #include "hal/base/folder.hpp"
+#include "hal/base/utf8.hpp"
 #include "hal/files/png.hpp"
 #include "hal/mjpeg/grey_decoder.hpp"
 
@@ -146,7 +147,7 @@ void add_jpeg(Recording& recording, std::string payload, mjpeg::GreyDecoder& dec
   }
   check_size(recording, size.width, size.height, name);
   recording.payloads.push_back(std::move(payload));
-  recording.names.push_back(name.string());
+  recording.names.push_back(base::as_utf8(name.string()));
 }
 
 Recording load_recording(const fs::path& path) {

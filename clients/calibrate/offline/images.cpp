@@ -11,6 +11,7 @@
 #include "daemon/calibration/calibration.hpp"
 #include "hal/base/atomic_file.hpp"
 #include "hal/base/folder.hpp"
+#include "hal/base/utf8.hpp"
 
 namespace dtact::ctl {
 namespace {
@@ -95,7 +96,8 @@ ImageSet load_images(const std::vector<std::string>& paths, const std::string& o
                                              set.sources.front().name, set.width(), set.height()));
       }
       set.images.push_back(std::move(image));
-      set.sources.push_back({file.filename().string(), calibration::sha256_hex(bytes)});
+      set.sources.push_back(
+          {base::as_utf8(file.filename().string()), calibration::sha256_hex(bytes)});
     }
   }
   return set;
