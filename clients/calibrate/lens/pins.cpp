@@ -79,7 +79,7 @@ struct Settled {
   const Lattice* lattice = nullptr;
   std::vector<Mark> marks;
   std::vector<std::string> missing;
-  Lens lens;          ///< Of 12 parameters, through the marks; only where there are so many.
+  Lens lens;          ///< Of 12 parameters, through the marks; only if has_lens().
   double rms_mm = 0;  ///< Their residual for it.
 
   [[nodiscard]] bool has_lens() const {

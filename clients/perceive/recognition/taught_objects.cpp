@@ -110,16 +110,17 @@ std::vector<TouchMap> read_presses(const std::filesystem::path& folder, const st
     throw std::runtime_error(
         fmt::format("{} has a name that is not UTF-8: rename it", base::as_utf8(file.string())));
   }
-  const auto fail = [&name](const std::string& why) {
-    throw std::runtime_error(fmt::format("{}: forget {}, or teach it again", why, name));
+  const auto damaged = [&name](const std::string& why) {
+    return std::runtime_error(fmt::format("{}: forget {}, or teach it again", why, name));
   };
   std::error_code error;
-  if (!std::filesystem::is_regular_file(file, error)) fail(file.string() + " is not a file");
+  if (!std::filesystem::is_regular_file(file, error))
+    throw damaged(file.string() + " is not a file");
   const std::string bytes = base::read_file(file);  // what cannot be read may be whole
   try {
     return decode_presses(bytes, file.string());
   } catch (const std::exception& e) {
-    fail(e.what());
+    throw damaged(e.what());
   }
 }
 
