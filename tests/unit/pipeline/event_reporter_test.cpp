@@ -56,8 +56,7 @@ TEST_F(EventReporterTest, AFrameThatWasNotMeasuredReportsNothingOfContact) {
   reporter.contact(frame(true, 1));
   ASSERT_TRUE(next());
   DepthFrame blind = frame(false, 2);
-  for (const ContactAbsence why :
-       {ContactAbsence::referencing, ContactAbsence::uncalibrated, ContactAbsence::unasked}) {
+  for (const ContactAbsence why : {ContactAbsence::referencing, ContactAbsence::uncalibrated}) {
     blind.contact_absence = why;
     reporter.contact(blind);
     EXPECT_FALSE(next());
@@ -73,6 +72,17 @@ TEST_F(EventReporterTest, AFrameThatWasNotMeasuredReportsNothingOfContact) {
   EXPECT_EQ(reported.at.sequence, 4U);
   EXPECT_EQ(reported.at.monotonic_ns, 5);
   EXPECT_EQ(reported.at.wall_ns, 6);
+}
+
+TEST_F(EventReporterTest, AContactThatNobodyListenedToBeginsForTheNextClient) {
+  reporter.contact(frame(true, 1));
+  ASSERT_TRUE(next());
+  DepthFrame unasked = frame(false, 2);
+  unasked.contact_absence = ContactAbsence::unasked;
+  reporter.contact(unasked);
+  EXPECT_FALSE(next()) << "no end, as nobody is there";
+  reporter.contact(frame(true, 3));
+  EXPECT_TRUE(std::get<ContactChanged>(next().value()).in_contact);
 }
 
 TEST_F(EventReporterTest, TheFirstStateIsAlwaysReported) {
