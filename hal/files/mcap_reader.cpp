@@ -143,6 +143,9 @@ void Reader::Impl::open() {
       schemas.clear();
       channels.clear();
       places.clear();
+      attachments.clear();
+      metadata.clear();
+      singles = {};
       statistics.reset();
     }
   }

@@ -464,6 +464,19 @@ TEST_F(Mcap, ADamagedAttachmentCostsItselfAlone) {
   }
 }
 
+// What a broken summary says counts for nothing, however far the scan comes.
+TEST_F(Mcap, ABrokenSummaryAddsNoAttachmentToADamagedFile) {
+  const std::string whole = attachment_of("a");
+  std::string no_head = attachment_of("b");
+  no_head.replace(0, kRecordHead, kRecordHead, '\0');
+  const std::uint64_t behind = kData + whole.size() + no_head.size();
+  write(file_of(whole + no_head + attachment_of("c"),
+                attachment_index_of(behind) + index_of(kData) + index_of(kData)));
+  const Reader reader(file());
+  ASSERT_THAT(reader.attachments(), SizeIs(1));
+  EXPECT_EQ(reader.attachments()[0].name, "a");
+}
+
 TEST_F(Mcap, AnIndexThatPointsAtARecordAgainAndAgainIsLeft) {
   MemorySink sink;
   Writer writer(sink);
