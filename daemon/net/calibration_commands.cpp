@@ -97,25 +97,27 @@ void CalibrationCommands::next_job() {
 }
 
 void CalibrationCommands::get(const Requester& requester, const v1::GetCalibration& request) {
-  std::optional<std::uint64_t> number;
-  if (request.has_number()) number = request.number();
-  if (!number && port_.status().calibration == nullptr) {
+  std::optional<std::uint64_t> number = in_use_;
+  if (request.has_number()) {
+    number = request.number();
+  } else if (port_.status().calibration == nullptr) {
     return requester.refuse(v1::ERROR_UNCALIBRATED,
                             "there is no calibration: make one with dtact-calibrate "
                             "depth and send it with dtactctl calibration upload, or take one "
                             "that dtactctl calibration list shows");
+  } else if (changing_) {
+    return requester.refuse(v1::ERROR_BUSY, kBusy);
   }
-  if (!number && changing_) return requester.refuse(v1::ERROR_BUSY, kBusy);
-  if (!number && !in_use_) {
+  if (!number) {
     return requester.refuse(v1::ERROR_STORAGE,
-                            "the calibration in use could not be written, so its files are not "
-                            "kept: make room in the state folder and upload it again");
+                            "the files of the calibration in use are not in the daemon's list: "
+                            "they could not be written, or lie elsewhere; upload it again, or "
+                            "activate one that dtactctl calibration list shows");
   }
-  if (!number) number = in_use_;
   if (reading_ >= kMaxReading) return requester.refuse(v1::ERROR_BUSY, kBusy);
   ++reading_;
   on_worker(
-      [&store = store_, number] {
+      [&store = store_, number = *number] {
         return attempt<CalibrationFiles>(v1::ERROR_STORAGE, [&] { return store.read(number); });
       },
       [requester](CalibrationCommands& self, Outcome<CalibrationFiles> read) {

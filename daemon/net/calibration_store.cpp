@@ -383,15 +383,9 @@ void FolderCalibrationStore::make_current(std::uint64_t number) {
   base::sync_folder(state_);
 }
 
-CalibrationFiles FolderCalibrationStore::read(std::optional<std::uint64_t> number) {
-  if (!number) number = current_number();
-  if (!number) {
-    throw std::runtime_error((state_ / kLink).string() +
-                             " leads to no calibration of the list: activate one of it");
-  }
-  const fs::path folder = folder_of(*number);
-  return {name_of(folder), base::read_file(folder / kToml), base::read_file(folder / kPng),
-          *number};
+CalibrationFiles FolderCalibrationStore::read(std::uint64_t number) {
+  const fs::path folder = folder_of(number);
+  return {name_of(folder), base::read_file(folder / kToml), base::read_file(folder / kPng), number};
 }
 
 }  // namespace dtact::net

@@ -85,8 +85,9 @@ class CalibrationStore {
   [[nodiscard]] virtual std::optional<std::uint64_t> started_number() const {
     return current_number();
   }
-  /// The files of one, unchecked; without a number, of the current one.
-  [[nodiscard]] virtual CalibrationFiles read(std::optional<std::uint64_t> number) = 0;
+  /// The files of one, unchecked. Throws NoSuchCalibration, or std::exception when they cannot be
+  /// read.
+  [[nodiscard]] virtual CalibrationFiles read(std::uint64_t number) = 0;
 };
 
 /// Keeps calibrations in the state directory:
@@ -138,7 +139,7 @@ class FolderCalibrationStore : public CalibrationStore {
   /// Nothing also when the link leads elsewhere.
   [[nodiscard]] std::optional<std::uint64_t> current_number() const override;
   [[nodiscard]] std::optional<std::uint64_t> started_number() const override;
-  [[nodiscard]] CalibrationFiles read(std::optional<std::uint64_t> number) override;
+  [[nodiscard]] CalibrationFiles read(std::uint64_t number) override;
 
  private:
   /// Identifies a change of a file without reading it. Nanoseconds of the system clock.

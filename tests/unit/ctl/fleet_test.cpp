@@ -111,8 +111,8 @@ TEST(Fleet, SendsEachItsOwnCalibration) {
   EXPECT_EQ(result.code, 1);
   EXPECT_THAT(result.out, AllOf(StartsWith("name   calibration\nleft   4\nright  "),
                                 HasSubstr("/right/calibration.toml: No such file or directory")));
-  EXPECT_EQ(left.store.read({}).name, "left");
-  EXPECT_EQ(right.store.read({}).name, "first");
+  EXPECT_EQ(left.store.read(left.store.current_number().value()).name, "left");
+  EXPECT_EQ(right.store.read(right.store.current_number().value()).name, "first");
 }
 
 TEST(Fleet, TakesNewReferences) {

@@ -69,9 +69,7 @@ class FakeStore : public CalibrationStore {
     pinned_ = pinned ? number : 0;
   }
   [[nodiscard]] std::optional<std::uint64_t> current_number() const override { return current_; }
-  CalibrationFiles read(std::optional<std::uint64_t> number) override {
-    return at(number.value_or(current_));
-  }
+  CalibrationFiles read(std::uint64_t number) override { return at(number); }
 
  private:
   [[nodiscard]] const CalibrationFiles& at(std::uint64_t number) const {
