@@ -44,7 +44,7 @@ struct Options {
   bool insecure = false;
   /// Unset: a lost connection is an error and makes the client unusable.
   std::optional<Reconnect> reconnect{};
-  /// Frames kept while a request waits for its answer, 1 or more; the oldest yield.
+  /// Frames kept while a request waits for its answer (0 counts as 1); the oldest yield.
   std::size_t kept_frames = 4;
 };
 

@@ -156,7 +156,8 @@ void Session::keep(v1::ServerMessage& message) {
   if (!message.has_frame()) return;
   last_sequence_ = message.frame().sequence();
   const auto is_frame = [](const Item& item) { return std::holds_alternative<v1::Frame>(item); };
-  if (static_cast<std::size_t>(std::ranges::count_if(inbox_, is_frame)) >= options_.kept_frames) {
+  const auto kept = static_cast<std::size_t>(std::ranges::count_if(inbox_, is_frame));
+  if (kept > 0 && kept >= options_.kept_frames) {
     inbox_.erase(std::ranges::find_if(inbox_, is_frame));
   }
   inbox_.emplace_back(std::move(*message.mutable_frame()));

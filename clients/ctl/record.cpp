@@ -64,7 +64,7 @@ class Recording {
  public:
   Recording(const Context& context, const RecordOptions& options)
       : options_(options),
-        client_(patient(context.target)),
+        client_(keeping_frames(context.target)),
         sink_(options.output, options.force),
         recorder_(sink_, {context.target.program, options.pictures_hz}) {}
 
@@ -108,7 +108,7 @@ class Recording {
 
  private:
   /// Frames are kept while a changed calibration's or reference's files come.
-  static client::Options patient(client::Options target) {
+  static client::Options keeping_frames(client::Options target) {
     target.kept_frames = 300;
     return target;
   }
@@ -142,8 +142,9 @@ class Recording {
       const v1::CalibrationFiles files = client_.calibration();
       put(recording::kCalibrationToml, "application/toml", files.calibration_toml());
       put(recording::kReferencePng, "image/png", files.reference_png());
-    } catch (const client::Refused&) {  // NOLINT(bugprone-empty-catch)
-      // Uncalibrated, or busy with another one, which an event will report.
+    } catch (const client::Refused& e) {
+      // Otherwise uncalibrated, or busy with another one, which an event will report.
+      if (e.code() == v1::ERROR_STORAGE) missing("calibration", e);
     } catch (const client::TimeoutError& e) {
       missing("calibration", e);
     }
