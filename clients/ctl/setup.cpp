@@ -407,10 +407,16 @@ class Setup {
     add("--ruler", options_.ruler);
     add("--lens", options_.lens);
     add("--crop", options_.crop);
-    if (run_program(command, context_.out) == 0) return;
     const std::string made = folder + "/calibration";
-    if (fs::exists(made)) {
-      stop(fmt::format("{} is made but not in use: dtactctl calibration upload {}", made, made));
+    const bool older = fs::exists(made);
+    if (run_program(command, context_.out) == 0) return;
+    if (!older && fs::exists(made)) {
+      Command upload = {"dtactctl"};
+      add_target(upload);
+      upload.insert(upload.end(), {"calibration", "upload", made});
+      throw cli::Failure(cli::kNotMet,
+                         fmt::format("{} is made but not in use; put it in use with: {}", made,
+                                     fmt::join(upload, " ")));
     }
     stop(fmt::format("there is no calibration yet; what was taken is in {} (--folder: another one)",
                      folder));
