@@ -103,13 +103,17 @@ std::string_view MeshReader::take(std::size_t count) {
   return taken;
 }
 
+void check_mesh_size(std::uintmax_t bytes, const std::string& name) {
+  if (bytes <= kMaxMeshBytes) return;
+  throw std::runtime_error(
+      fmt::format("{}: larger than {} MiB: simplify the mesh", name, kMaxMeshBytes >> 20U));
+}
+
 Mesh parse_mesh(std::string_view bytes, const std::string& name) {
   const auto fail = [&name](const std::string& sentence) {
     throw std::runtime_error(fmt::format("{}: {}", name, sentence));
   };
-  if (bytes.size() > kMaxMeshBytes) {
-    fail(fmt::format("larger than {} MiB: simplify the mesh", kMaxMeshBytes >> 20U));
-  }
+  check_mesh_size(bytes.size(), name);
   Mesh mesh = bytes.starts_with("ply") ? parse_ply(bytes, name) : parse_stl(bytes, name);
   if (mesh.points.empty()) fail("there are no points in it");
   for (const auto& point : mesh.points) {

@@ -17,6 +17,8 @@ struct Mesh {
 };
 
 constexpr std::size_t kMaxMeshBytes = std::size_t{64} << 20U;
+/// Throws std::runtime_error naming the file and the limit where `bytes` is above kMaxMeshBytes.
+void check_mesh_size(std::uintmax_t bytes, const std::string& name);
 /// Points, and triangles.
 constexpr std::size_t kMaxMeshParts = 2'000'000;
 

@@ -14,10 +14,8 @@ namespace dtact::perceive {
 std::shared_ptr<const ObjectModel> load_object(const std::filesystem::path& file,
                                                const std::string& unit) {
   std::error_code unknown;
-  if (std::filesystem::file_size(file, unknown) > kMaxMeshBytes && !unknown) {
-    throw std::runtime_error(fmt::format("{}: larger than {} MiB: simplify the mesh", file.string(),
-                                         kMaxMeshBytes >> 20U));
-  }
+  const std::uintmax_t size = std::filesystem::file_size(file, unknown);
+  if (!unknown) check_mesh_size(size, file.string());
   const Mesh mesh = parse_mesh(base::read_file(file, kMaxMeshBytes), file.string());
   try {
     return std::make_shared<const ObjectModel>(

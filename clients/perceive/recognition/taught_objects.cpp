@@ -114,8 +114,9 @@ std::vector<TouchMap> read_presses(const std::filesystem::path& folder, const st
     return std::runtime_error(fmt::format("{}: forget {}, or teach it again", why, name));
   };
   std::error_code error;
-  if (!std::filesystem::is_regular_file(file, error))
+  if (!std::filesystem::is_regular_file(file, error)) {
     throw damaged(file.string() + " is not a file");
+  }
   const std::string bytes = base::read_file(file);  // what cannot be read may be whole
   try {
     return decode_presses(bytes, file.string());
