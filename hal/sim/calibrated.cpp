@@ -40,7 +40,7 @@ void take_from_calibration(const std::filesystem::path& folder, Scene& scene) {
                              "which a simulator of it needs");
   }
   KeyReader gel = root.table("gel");
-  scene.gel.thickness_mm = estimate(gel, "thickness_mm", 0.5, 5);
+  scene.gel.thickness_mm = estimate(gel, "thickness_mm", kMinThicknessMm, kMaxThicknessMm);
   OpticsModel& optics = scene.optics;
   optics.narrow_mm = estimate(gel, "narrow_mm", 0, 3);
   optics.wide_mm = estimate(gel, "wide_mm", 0, 6);

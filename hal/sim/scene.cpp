@@ -230,8 +230,7 @@ void read_scene(std::string_view toml_text, const std::string& name,
   read_camera(root.table_if("camera"), scene.camera);
 
   KeyReader gel = root.table_if("gel");
-  // Truth holds indentations up to 4.09 mm.
-  gel.number_if("thickness_mm", scene.gel.thickness_mm, 0.5, 4.5);
+  gel.number_if("thickness_mm", scene.gel.thickness_mm, kMinThicknessMm, kMaxThicknessMm);
   gel.number_if("youngs_modulus_mpa", scene.gel.youngs_modulus_mpa, 0.001, 10);
   gel.number_if("poisson", scene.gel.poisson, 0.4, 0.5);
   gel.number_if("grid_mm", scene.gel.grid_mm, 0.05, 0.5);

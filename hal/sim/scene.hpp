@@ -25,6 +25,11 @@ struct CameraModel {
   int light_delay_frames = 0;
 };
 
+/// Millimetres. Objects press at most 0.9 of the thickness, and Truth holds indentations up
+/// to 4.09.
+inline constexpr double kMinThicknessMm = 0.5;
+inline constexpr double kMaxThicknessMm = 4.5;
+
 struct GelModel {
   double thickness_mm = 0;
   double youngs_modulus_mpa = 0;
