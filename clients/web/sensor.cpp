@@ -167,9 +167,9 @@ void Sensor::subscribe(const std::shared_ptr<net::Session>& session, std::uint64
                          number](v1::Reply reply) {
     const auto viewer = weak.lock();
     if (viewer == nullptr) return;
-    std::uint64_t& accepted = viewers_[viewer.get()].accepted;
-    if (!reply.has_error() && number > accepted) {
-      accepted = number;
+    const auto known = viewers_.find(viewer.get());
+    if (known != viewers_.end() && !reply.has_error() && number > known->second.accepted) {
+      known->second.accepted = number;
       viewer->subscribe(every_frame(request));
     }
     send(*viewer, id, std::move(reply));
