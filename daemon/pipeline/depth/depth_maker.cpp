@@ -22,7 +22,7 @@ void DepthMaker::set_light(double factor) noexcept { maps_->set_light(factor); }
 
 void DepthMaker::skip(DepthFrame& out, ContactAbsence why) noexcept {
   beyond_ = false;
-  // What nobody asks for may last for hours: the next client begins without contact.
+  // Nobody has asked for contact, for hours perhaps: the next client begins without it.
   if (why == ContactAbsence::unasked) contact_ = ContactDetector(config_.contact);
   out.has_depth = false;
   out.contact_absence = why;
