@@ -10,6 +10,7 @@
 
 #include "daemon/serve/accept_loop.hpp"
 #include "daemon/serve/listener.hpp"
+#include "daemon/serve/security.hpp"
 
 namespace dtact::net {
 namespace {

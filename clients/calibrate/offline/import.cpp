@@ -19,6 +19,7 @@
 #include "clients/calibrate/offline/images.hpp"
 #include "clients/calibrate/offline/import_folder.hpp"
 #include "clients/calibrate/offline/offline.hpp"
+#include "clients/common/program.hpp"
 
 namespace dtact::ctl {
 namespace {
