@@ -17,6 +17,7 @@
 #include "clients/web/page.hpp"
 #include "clients/web/server.hpp"
 #include "daemon/serve/security.hpp"
+#include "hal/base/free_memory.hpp"
 #include "hal/base/utf8.hpp"
 #include "version.hpp"
 
@@ -32,6 +33,7 @@ struct Arguments {
 };
 
 void serve(const cli::Context& context, const Arguments& arguments) {
+  base::keep_little_memory();
   Settings settings = arguments.settings;
   settings.daemons = cli::parse_daemons("--daemon", arguments.daemons, context.target);
   if (settings.daemons.empty() && !settings.find) settings.daemons = {{"sensor", context.target}};

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <malloc.h>
 #include <spdlog/spdlog.h>
 
 #include <array>
@@ -39,6 +38,7 @@
 #include "daemon/serve/security.hpp"
 #include "hal/base/clock.hpp"
 #include "hal/base/cpu_claim.hpp"
+#include "hal/base/free_memory.hpp"
 #include "hal/base/machine.hpp"
 #include "hal/base/rt_thread.hpp"
 #include "hal/base/unique_fd.hpp"
@@ -138,19 +138,6 @@ net::NetConfig make_net_config(const Config& config) {
   return net;
 }
 
-/// Returns memory of large messages and of frames to the system after use, even from the middle of
-/// the heap. Without this glibc keeps up to twice the largest block ever used (mallopt(3),
-/// dynamic mmap threshold), locked into memory with the rest. Frames' buffers are reused, so
-/// a frame costs no page faults. Free memory in one thread's arena is of no use to another thread.
-/// Two arenas are enough: the capture thread, which must not wait for another's lock, allocates
-/// nothing.
-void keep_little_memory() {
-  constexpr int kLarge = 256 << 10;
-  (void)::mallopt(M_ARENA_MAX, 2);
-  (void)::mallopt(M_MMAP_THRESHOLD, kLarge);
-  (void)::mallopt(M_TRIM_THRESHOLD, 4 << 20);
-}
-
 /// Nothing when none is configured.
 std::optional<metrics::Endpoint> serve_metrics(asio::io_context& io,
                                                const metrics::EndpointConfig& config,
@@ -221,7 +208,7 @@ void run_daemon(const Config& config, const std::function<Config()>& load) {
                       std::chrono::steady_clock::now() - began)
                       .count());
   };
-  keep_little_memory();
+  base::keep_little_memory();
   base::demote_at_rttime_limit();
   asio::io_context io(1);
   // Before any thread starts, so that every thread leaves the signals to this one.

@@ -33,6 +33,13 @@ bool can_lock_again() {
 
 }  // namespace
 
+void keep_little_memory() {
+  constexpr int kLarge = 256 << 10;
+  (void)::mallopt(M_ARENA_MAX, 2);
+  (void)::mallopt(M_MMAP_THRESHOLD, kLarge);
+  (void)::mallopt(M_TRIM_THRESHOLD, 4 << 20);
+}
+
 void release_free_memory() {
   const bool locked = status_field("VmLck", 10) > 0;
   if (locked && !can_lock_again()) return;
