@@ -63,10 +63,12 @@ frames() {
 
 apt_get() { apt-get -y -qq --no-install-recommends "$@" > /tmp/apt 2>&1 || fail "apt-get $*: $(cat /tmp/apt)"; }
 
-# Files in the file system, without those that change by themselves.
+# Files in the file system, without those that change by themselves; a service that starts again has another
+# private folder.
 files() {
   find / -xdev \( -path /proc -o -path /sys -o -path /run -o -path /tmp -o -path /job -o -path /dev \
-    -o -path /var/cache -o -path /var/log -o -path /var/lib/apt -o -path /var/lib/dpkg \) -prune -o -print | sort
+    -o -path /var/cache -o -path /var/log -o -path /var/lib/apt -o -path /var/lib/dpkg \) -prune -o -print \
+    | sed -E 's|(/systemd-private-[^/]*\.service-)[A-Za-z0-9]{6}|\1|' | sort
 }
 still_scene() {
   sed -i 's|^scene = ""|scene = "/usr/share/dtactd/scenes/nothing.toml"|' "$config"
