@@ -1,5 +1,6 @@
 """The programs under test, named by the environment: DTACTD, DTACT_WEB, DTACT_PERCEIVE, DTACTCTL,
 CALIBRATE, SIM_RENDER."""
+import atexit
 import hashlib
 import os
 import pathlib
@@ -81,6 +82,7 @@ class Program:
     def start(self) -> None:
         with open(self.log, "wb") as out:
             self.process = subprocess.Popen(self.command, stdout=out, stderr=subprocess.STDOUT)
+        atexit.register(self.process.kill)  # nothing is torn down where a set-up has failed
         until = time.monotonic() + 60
         while not (found := re.search(self.listening, self.text())):
             if self.process.poll() is not None or time.monotonic() > until:
@@ -108,6 +110,8 @@ class Daemon(Program):
         # At normal priority, so that other programs on this machine keep their share.
         every = [f"net.port={port}", f"net.name={name}", f"state_dir={folder}/{name}-state",
                  f"camera.sim.scene={scene}", "capture.fifo_priority=0", "net.fifo_priority=0",
+                 # A slow machine sees few pictures between two presses.
+                 "reference.frames=8",
                  *settings]
         super().__init__([*within, os.environ["DTACTD"], *(word for one in every for word in ("--set", one))],
                          folder / f"{name}.log", r"listening on 127\.0\.0\.1:(\d+)")
