@@ -157,7 +157,7 @@ void Session::keep(v1::ServerMessage& message) {
   last_sequence_ = message.frame().sequence();
   const auto is_frame = [](const Item& item) { return std::holds_alternative<v1::Frame>(item); };
   const auto kept = static_cast<std::size_t>(std::ranges::count_if(inbox_, is_frame));
-  if (kept > 0 && kept >= options_.kept_frames) {
+  if (kept >= std::max<std::size_t>(1, options_.kept_frames)) {
     inbox_.erase(std::ranges::find_if(inbox_, is_frame));
   }
   inbox_.emplace_back(std::move(*message.mutable_frame()));

@@ -7,8 +7,8 @@ namespace dtact::base {
 /// (mallopt(3), dynamic mmap threshold), locked into memory with the rest. Free memory in one
 /// thread's arena is of no use to another thread. Two arenas are enough: the capture thread, which
 /// must not wait for another's lock, allocates nothing. A block of 256 KiB or more costs page
-/// faults each time it is allocated: buffers of that size are reused. Called before any thread
-/// starts.
+/// faults each time it is allocated: the daemon reuses the buffers of its frames. Called before any
+/// thread starts.
 void keep_little_memory();
 
 /// Gives free memory back to the system, also that of a process whose memory is locked

@@ -431,7 +431,7 @@ TEST_F(Store, PipesInPlaceOfItsFilesAreNotWaitedFor) {
   EXPECT_THAT(numbers(store.list()), ElementsAre(1, 2));
 }
 
-TEST_F(Store, SaysThatTheLinkLeadsElsewhere) {
+TEST_F(Store, HasNoNumberWhereTheLinkLeadsElsewhere) {
   FolderCalibrationStore store(state_, {});
   fs::create_directory_symlink(make_configured(), state_ / "calibration");
   EXPECT_EQ(store.current(), folder_.path() / "factory");  // set by an administrator
