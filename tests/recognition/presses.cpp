@@ -20,7 +20,6 @@ namespace sim = hal::sim;
 constexpr double kMaxNewtons = 80;
 constexpr double kMinDeepestMm = 0.15;
 constexpr int kFramesEach = 60;  // from one press to the next
-constexpr int kLights = 4;
 constexpr int kReferenceFrames = 16;
 
 std::uint64_t frame_of(std::size_t press) {
@@ -106,8 +105,7 @@ double draw_depth(whole::Draw& draw, double thickness_mm) {
 
 }  // namespace
 
-bool make_presses(const Wanted& wanted,
-                  const std::function<void(const Press&, const perceive::TouchMap&)>& take) {
+bool make_presses(const Wanted& wanted, const TakePress& take) {
   const whole::RandomSensor sensor = whole::draw_sensor(wanted.seed, wanted.sensor);
   whole::Draw draw(whole::seed_of(sensor.seed, 7));
   sim::Scene scene = sensor.scene;
@@ -126,6 +124,7 @@ bool make_presses(const Wanted& wanted,
   add_press(scene, sim::ball(4), 0.8 * thickness, draw.uniform(-1, 1), draw.uniform(-1, 1));
   for (int i = 0; i < wanted.presses; ++i) {
     Press press;
+    press.press = i;
     press.thickness_mm = thickness;
     std::tie(press.kind, press.variant) = wanted.object(draw);
     const sim::Object object = draw_object(press.kind, press.variant, draw);
@@ -136,32 +135,37 @@ bool make_presses(const Wanted& wanted,
     const double tilt =
         std::tan(std::numbers::pi / 180 * draw.uniform(0, draw.chance(0.25) ? 10 : 2.5));
     const double axis = draw.uniform(0, 2 * std::numbers::pi);
-    add_press(scene,
-              placed(object,
-                     {press.x_mm, press.y_mm, draw.uniform(0, 2 * std::numbers::pi),
-                      tilt * std::cos(axis), tilt * std::sin(axis)},
-                     half_width, half_height),
-              press.depth_mm, 0, 0);
-    presses.push_back(press);
+    const sim::Object pressed =
+        placed(object,
+               {press.x_mm, press.y_mm, draw.uniform(0, 2 * std::numbers::pi),
+                tilt * std::cos(axis), tilt * std::sin(axis)},
+               half_width, half_height);
+    for (int frame = 0; frame < wanted.frames; ++frame) {
+      if (frame > 0) press.depth_mm = draw_depth(draw, thickness);
+      add_press(scene, pressed, press.depth_mm, 0, 0);
+      presses.push_back(press);
+    }
   }
 
   Camera camera(scene, sensor.seed);
   const auto model = calibrated(camera, 0);
   if (!model) return false;
   calibration::DepthReader reader(model);
-  for (int light = 0; light < kLights; ++light) {
+  for (int light = 0; light < wanted.lights; ++light) {
     Light lit;
     if (light > 0) lit.gain = draw.uniform(0.7, 1.2);
     if (light > 1) lit.levels.at(static_cast<std::size_t>(draw.index(hal::kLedCount))) = 0;
     const std::vector<std::uint16_t> reference = camera.reference_q8(lit);
     reader.set_reference(reference);
-    for (std::size_t i = static_cast<std::size_t>(light); i < presses.size(); i += kLights) {
+    for (std::size_t i = static_cast<std::size_t>(light); i < presses.size();
+         i += static_cast<std::size_t>(wanted.lights)) {
       const std::uint64_t sequence = frame_of(i + 1);
       presses[i].newtons = camera.truth().force_n(sequence);
       if (presses[i].newtons > kMaxNewtons) continue;
       Light drifted = lit;
       drifted.gain *= draw.uniform(0.995, 1.005);  // not followed by the reference
-      const auto um = reader.read(camera.frame(sequence, drifted));
+      const image::Grey8& image = camera.frame(sequence, drifted);
+      const auto um = reader.read(image);
       perceive::DepthGrid grid;
       grid.width = grid.full_width = model->rectify.width;
       grid.height = grid.full_height = model->rectify.height;
@@ -169,7 +173,7 @@ bool make_presses(const Wanted& wanted,
       grid.untrusted = recon::kUntrusted;
       grid.values = um;
       const perceive::TouchMap map = perceive::touch_map(grid);
-      if (map.deepest_mm >= kMinDeepestMm) take(presses[i], map);
+      if (map.deepest_mm >= kMinDeepestMm) take(presses[i], map, image);
     }
   }
   return true;

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "clients/perceive/recognition/touch_map.hpp"
+#include "hal/files/png.hpp"
 #include "tests/accuracy/whole/random_draw.hpp"
 
 namespace dtact::recognition {
@@ -13,6 +14,7 @@ namespace dtact::recognition {
 struct Press {
   int kind = 0;  ///< Index into kinds().
   int variant = 0;
+  int press = 0;            ///< Number on its sensor; the frames of one press share it.
   double thickness_mm = 0;  ///< Of the gel.
   double depth_mm = 0;
   double x_mm = 0;
@@ -26,15 +28,19 @@ struct Wanted {
   std::uint64_t seed = 1;
   int sensor = 0;
   int presses = 60;
+  int frames = 1;  ///< Of each press: at one place, each at a depth of its own.
+  int lights = 4;  ///< The calibration's, another brightness, and the rest each without one LED.
   /// Draws what is pressed: kind and variant.
   std::function<std::pair<int, int>(whole::Draw&)> object;
   double grid_mm = 0.25;   ///< Of the contact.
   int camera_width = 400;  ///< Pixels; the field stays.
 };
 
-/// Calls `take` for each press that presses by at most 80 N and whose depth map shows a contact.
+using TakePress =
+    std::function<void(const Press&, const perceive::TouchMap&, const image::Grey8& camera_image)>;
+
+/// Calls `take` for each frame that presses by at most 80 N and whose depth map shows a contact.
 /// Returns false, without a press, for a sensor whose calibration is refused.
-bool make_presses(const Wanted& wanted,
-                  const std::function<void(const Press&, const perceive::TouchMap&)>& take);
+bool make_presses(const Wanted& wanted, const TakePress& take);
 
 }  // namespace dtact::recognition

@@ -24,7 +24,18 @@ struct Arguments {
   int first_variant = 0;
   int last_variant = 7;
   double known = 0.7;
+  bool images = false;
 };
+
+// The middle of a camera image, as many columns as rows.
+void write_square(const dtact::image::Grey8& image, std::ofstream& out) {
+  const int left = (image.width - image.height) / 2;
+  for (int row = 0; row < image.height; ++row) {
+    const auto begin = static_cast<std::size_t>(row) * static_cast<std::size_t>(image.width) +
+                       static_cast<std::size_t>(left);
+    out.write(reinterpret_cast<const char*>(&image.pixels[begin]), image.height);
+  }
+}
 
 void make(Arguments& arguments) {
   std::filesystem::create_directories(arguments.folder);
@@ -32,7 +43,11 @@ void make(Arguments& arguments) {
   std::ofstream truth(arguments.folder / "truth.csv");
   maps.exceptions(std::ios::failbit | std::ios::badbit);
   truth.exceptions(std::ios::failbit | std::ios::badbit);
-  truth << "sensor,thickness_mm,kind,variant,depth_mm,x_mm,y_mm,newtons,deepest_mm,area_mm2,cut\n";
+  std::ofstream images;
+  images.exceptions(std::ios::failbit | std::ios::badbit);
+  if (arguments.images) images.open(arguments.folder / "images.u8", std::ios::binary);
+  truth << "sensor,thickness_mm,kind,variant,press,depth_mm,x_mm,y_mm,newtons,deepest_mm,area_mm2,"
+           "cut\n";
   arguments.wanted.object = [&](dtact::whole::Draw& draw) {
     // The shares of the twelve classes and of the others, whatever their numbers.
     const bool known = arguments.last_kind < rec::kClasses ||
@@ -48,7 +63,8 @@ void make(Arguments& arguments) {
     const int sensor = arguments.wanted.sensor;
     refused +=
         make_presses(arguments.wanted,
-                     [&](const rec::Press& press, const dtact::perceive::TouchMap& map) {
+                     [&](const rec::Press& press, const dtact::perceive::TouchMap& map,
+                         const dtact::image::Grey8& image) {
                        std::vector<std::int16_t> um;
                        for (const float mm : map.mm) {
                          um.push_back(static_cast<std::int16_t>(std::lround(1000 * mm)));
@@ -56,10 +72,11 @@ void make(Arguments& arguments) {
                        maps.write(reinterpret_cast<const char*>(um.data()),
                                   static_cast<std::streamsize>(um.size() * sizeof(um[0])));
                        truth << fmt::format(
-                           "{},{:.3f},{},{},{:.3f},{:.2f},{:.2f},{:.2f},{:.3f},{:.2f},{:.3f}\n",
-                           sensor, press.thickness_mm, press.kind, press.variant, press.depth_mm,
-                           press.x_mm, press.y_mm, press.newtons, map.deepest_mm, map.area_mm2,
-                           map.cut);
+                           "{},{:.3f},{},{},{},{:.3f},{:.2f},{:.2f},{:.2f},{:.3f},{:.2f},{:.3f}\n",
+                           sensor, press.thickness_mm, press.kind, press.variant, press.press,
+                           press.depth_mm, press.x_mm, press.y_mm, press.newtons, map.deepest_mm,
+                           map.area_mm2, map.cut);
+                       if (images.is_open()) write_square(image, images);
                        ++written;
                      })
             ? 0
@@ -77,15 +94,21 @@ void make(Arguments& arguments) {
 int main(int argc, char** argv) {
   try {
     CLI::App app(
-        "Writes simulated presses: maps.i16 (96 x 96 values each, micrometres, int16) and "
-        "truth.csv.",
+        "Writes simulated presses: maps.i16 (96 x 96 values each, micrometres, int16), truth.csv "
+        "and, "
+        "if asked for, images.u8.",
         "recognition_presses");
     Arguments arguments;
-    app.add_option("folder", arguments.folder, "folder for the two files")->required();
+    app.add_option("folder", arguments.folder, "folder for the files")->required();
     app.add_option("--seed", arguments.wanted.seed, "of the sensors and presses");
     app.add_option("--first-sensor", arguments.wanted.sensor, "number of the first sensor");
     app.add_option("--sensors", arguments.sensors, "number of sensors");
     app.add_option("--presses", arguments.wanted.presses, "on each sensor");
+    app.add_option("--frames", arguments.wanted.frames,
+                   "of each press, each as deep as it is drawn");
+    app.add_option("--lights", arguments.wanted.lights, "1: the calibration's light alone");
+    app.add_flag("--images", arguments.images,
+                 "write the camera images, too: the middle square, one byte a pixel");
     app.add_option("--first-kind", arguments.first_kind, "kinds from here");
     app.add_option("--last-kind", arguments.last_kind, "up to here; 30: without those for tests");
     app.add_option("--first-variant", arguments.first_variant, "variants from here");

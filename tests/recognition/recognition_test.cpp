@@ -43,7 +43,7 @@ TEST(Recognition, NamesFreshPressesOnSensorsNotSeenInTraining) {
                         known ? draw.index(kClasses) : draw.between(kClasses, kinds_in_all - 1),
                         draw.index(8)};
                   }};
-    ASSERT_TRUE(make_presses(wanted, [&](const Press& press, const TouchMap& map) {
+    ASSERT_TRUE(make_presses(wanted, [&](const Press& press, const TouchMap& map, const auto&) {
       if (map.deepest_mm < 0.3 || map.cut > 1) return;
       const auto output = network.run(map);
       if (press.kind < kClasses) {
