@@ -6,7 +6,8 @@
 
 `image`: the paper's recipe. ResNet-18 on camera images, random crop, flip and rotation, cross-entropy, Adam with
 a rate of 1e-3 that falls to 0.3 of it every 5 epochs, 15 epochs, 70 % of the images for training. The paper
-leaves open the batch (32 here), the start (random weights here) and which side is cropped (224 of 256 pixels).
+leaves open the batch (32 here), the start (random weights here), the crop (224 of 256 pixels here) and the angles
+(quarter turns here). Products are in bfloat16, which is two to three times as fast on processors that have it.
 `map`: the network of train.py on depth maps, as small as the shipped one, with the same images, split and epochs.
 
 A split by frame puts frames of one press on both sides, as the paper's does; by press, no press is on both; by
@@ -69,23 +70,29 @@ def split_by(group, kinds, random):
 
 class ImageInput:
     """ResNet-18 and the paper's augmentation."""
-    def __init__(self, images):
+    def __init__(self, images, training):
         self.images = images
+        # The mean is many times the contrast: as it is, batch norm's running means come too late.
+        levels = images[training].float()
+        self.mean, self.deviation = levels.mean(), levels.std()
         self.network = torchvision.models.resnet18(num_classes=train.CLASSES).to(memory_format=torch.channels_last)
+        # Quarter turns: others leave black corners, which the images of the test do not have.
         self.augment = transforms.Compose([
-            transforms.RandomRotation(180, transforms.InterpolationMode.BILINEAR), transforms.RandomCrop(CROP),
-            transforms.RandomHorizontalFlip(), transforms.RandomVerticalFlip()])
+            transforms.RandomCrop(CROP), transforms.RandomHorizontalFlip(),
+            transforms.RandomChoice([lambda image, k=k: torch.rot90(image, k, (1, 2)) for k in range(4)])])
         self.optimiser = torch.optim.Adam(self.network.parameters(), 1e-3)
         self.schedule = torch.optim.lr_scheduler.StepLR(self.optimiser, 5, 0.3)
         self.each_step = False
 
     def batch(self, chosen, training):
         change = self.augment if training else transforms.CenterCrop(CROP)
-        pixels = torch.stack([change(self.images[i]) for i in chosen]).float() / 255
+        pixels = torch.stack([change(self.images[i]) for i in chosen]).float()
+        pixels = (pixels - self.mean) / self.deviation
         return pixels.expand(-1, 3, -1, -1).contiguous(memory_format=torch.channels_last)
 
     def scores(self, pixels):
-        return self.network(pixels)
+        with torch.autocast("cpu", dtype=torch.bfloat16):
+            return self.network(pixels).float()
 
 
 class MapInput:
@@ -110,7 +117,7 @@ def run(what, images, maps, kinds, training, test, seed):
     torch.manual_seed(seed)
     random = np.random.default_rng(seed)
     steps = len(training) // BATCH
-    learner = ImageInput(images) if what == "image" else MapInput(maps, EPOCHS * steps, random)
+    learner = ImageInput(images, training) if what == "image" else MapInput(maps, EPOCHS * steps, random)
     labels = torch.from_numpy(kinds)
     start = time.process_time()
     for epoch in range(EPOCHS):
@@ -127,12 +134,14 @@ def run(what, images, maps, kinds, training, test, seed):
             losses.append(float(loss))
         if not learner.each_step:
             learner.schedule.step()
+        print(f"  epoch {epoch + 1}: loss {np.mean(losses):.3f}, {time.process_time() - start:.0f} s of processor", flush=True)
+        if (epoch + 1) % 5:
+            continue
         learner.network.eval()
         with torch.no_grad():
             right = [(learner.scores(learner.batch(part, False)).argmax(1) == labels[part]).float().sum()
                      for part in np.array_split(test, len(test) // BATCH + 1)]
-        print(f"  epoch {epoch + 1}: loss {np.mean(losses):.3f}, {float(sum(right)) / len(test):.3f} of {len(test)} "
-              f"right, {time.process_time() - start:.0f} s of processor", flush=True)
+        print(f"  {float(sum(right)) / len(test):.3f} of {len(test)} named rightly", flush=True)
 
 
 def main():
