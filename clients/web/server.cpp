@@ -78,6 +78,7 @@ Server::Server(asio::io_context& io, Settings settings, const Page& page)
   guided_ = std::make_unique<guided::GuidedEndpoint>(
       sources(), std::move(settings.work_folder), std::move(settings.taught), config_, admission_);
   listener_ = net::listen_tcp(io, config_, [this](asio::ip::tcp::socket socket, net::Peer peer) {
+    if (tls_ && !admission_.take_handshake(peer)) return;
     auto ticket = limits_.admit(peer.host);
     serve_http(std::move(socket), std::move(peer), tls_ ? &tls_->context : nullptr,
                weak_from_this(), std::move(ticket), config_.peer_timeout);

@@ -76,6 +76,19 @@ std::chrono::milliseconds Admission::delay_after_wrong(const std::string& host) 
   return std::min(kMaxDenial, kDenial * (1U << std::min(wrong.count++, 16U)));
 }
 
+bool Admission::take_handshake(const Peer& peer) {
+  if (handshakes_.size() >= kMaxHandshakeHosts && !handshakes_.contains(peer.host)) {
+    handshakes_.clear();
+  }
+  const auto bucket = handshakes_.try_emplace(peer.host, kHandshakesPerS, kHandshakesPerS).first;
+  if (bucket->second.take(1)) return true;
+  config_.log({LogLevel::warning,
+               fmt::format("client {}: more than {} TLS handshakes a second came from {}",
+                           peer.address, kHandshakesPerS, peer.host),
+               peer.address, LogSubject::unauthenticated});
+  return false;
+}
+
 void Admission::leave(const Peer& peer) {
   --clients_;
   const auto host = hosts_.find(peer.host);

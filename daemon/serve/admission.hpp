@@ -10,6 +10,7 @@
 
 #include "daemon/serve/net_config.hpp"
 #include "daemon/serve/rights.hpp"
+#include "daemon/serve/token_bucket.hpp"
 #include "daemon/serve/tokens.hpp"
 #include "daemon/serve/transport.hpp"
 
@@ -34,6 +35,10 @@ class Admission {
   /// Places above NetConfig::max_clients for those with Peer.trusted, so that root reaches a full
   /// daemon.
   static constexpr std::size_t kReserved = 4;
+  /// TLS handshakes a second that one address gets, and as many at once after a rest. A stranger
+  /// may ask for them, and each costs more than a frame of a summary: some 0.3 ms of the thread
+  /// that sends the frames.
+  static constexpr double kHandshakesPerS = 100;
 
   /// Throws as read_tokens().
   explicit Admission(const NetConfig& config);
@@ -55,6 +60,8 @@ class Admission {
   /// After a Hello with this token. An authenticated client counts until leave().
   [[nodiscard]] Verdict enter(const Peer& peer, const std::string& token);
   void leave(const Peer& peer);
+  /// Whether this connection gets a TLS handshake now. One that does not is closed.
+  [[nodiscard]] bool take_handshake(const Peer& peer);
   /// False: its token was revoked since, or has other rights now.
   [[nodiscard]] bool still_allows(const Tokens::Grant& grant) const {
     return grant.hash.empty() || (tokens_ && tokens_->holds(grant));
@@ -81,6 +88,10 @@ class Admission {
   static constexpr std::size_t kMaxWrongHosts = 1024;
   [[nodiscard]] std::chrono::milliseconds delay_after_wrong(const std::string& host);
   std::map<std::string, Wrong> wrong_;  ///< … by Peer.host.
+
+  /// Beyond it all are forgotten: so many addresses have so many bursts of their own anyway.
+  static constexpr std::size_t kMaxHandshakeHosts = 1024;
+  std::map<std::string, TokenBucket> handshakes_;  ///< By Peer.host.
 
   struct Held {
     std::string host;

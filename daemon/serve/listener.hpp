@@ -2,7 +2,6 @@
 
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/tcp.hpp>
-#include <boost/asio/ssl/context.hpp>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -13,11 +12,9 @@
 
 namespace dtact::net {
 
-/// Takes connections at one endpoint and hands each to its `on_connection`.
+/// Takes connections at one endpoint and hands each on.
 class Listener {
  public:
-  using OnConnection = std::function<void(std::unique_ptr<Transport>)>;
-
   Listener() = default;
   Listener(const Listener&) = delete;
   Listener& operator=(const Listener&) = delete;
@@ -36,20 +33,17 @@ using OnSocket = std::function<void(boost::asio::ip::tcp::socket, Peer)>;
 
 /// Binds config.address and listens, also on an address that no interface has yet: clients can
 /// connect once one has. Throws std::runtime_error naming address, port and fix. What is passed
-/// by reference or pointer must outlive it; without `tls` it speaks plain TCP.
-[[nodiscard]] std::shared_ptr<Listener> listen_tcp(boost::asio::io_context& io,
-                                                   const NetConfig& config,
-                                                   boost::asio::ssl::context* tls,
-                                                   Listener::OnConnection on_connection);
-/// The same for who speaks something of its own over the sockets.
+/// by reference must outlive it.
 [[nodiscard]] std::shared_ptr<Listener> listen_tcp(boost::asio::io_context& io,
                                                    const NetConfig& config, OnSocket on_socket);
+
+using OnConnection = std::function<void(std::unique_ptr<Transport>)>;
 
 /// Binds config.unix_socket, open to every user of this machine: Peer.trusted marks users without
 /// need of a token. Replaces a stale socket, and removes its own at the
 /// end. Throws std::runtime_error with path and fix, also when another program listens there.
 [[nodiscard]] std::shared_ptr<Listener> listen_unix(boost::asio::io_context& io,
                                                     const NetConfig& config,
-                                                    Listener::OnConnection on_connection);
+                                                    OnConnection on_connection);
 
 }  // namespace dtact::net

@@ -20,7 +20,12 @@ Listeners::Listeners(boost::asio::io_context& io, NetConfig settings)
     endpoints_.push_back({listeners_.back()->address(), false, token, false, ""});
   }
   if (!config_.address.empty()) {
-    listeners_.push_back(listen_tcp(io, config_, tls_ ? &tls_->context : nullptr, admit));
+    listeners_.push_back(
+        listen_tcp(io, config_, [this, admit](boost::asio::ip::tcp::socket socket, Peer peer) {
+          if (tls_ && !admission_.take_handshake(peer)) return;
+          admit(over_tcp(std::move(socket), std::move(peer), config_.peer_timeout,
+                         tls_ ? &tls_->context : nullptr));
+        }));
     endpoints_.push_back({listeners_.back()->address(), tls_ != nullptr, token,
                           is_insecure(config_), tls_ ? tls_->fingerprint : ""});
     if (tls_) endpoints_.back().certificate_expires = tls_->expires;

@@ -112,17 +112,6 @@ class TcpListener : public Listener {
 }  // namespace
 
 std::shared_ptr<Listener> listen_tcp(asio::io_context& io, const NetConfig& config,
-                                     asio::ssl::context* tls,
-                                     Listener::OnConnection on_connection) {
-  return listen_tcp(
-      io, config,
-      [tls, peer_timeout = config.peer_timeout, on_connection = std::move(on_connection)](
-          tcp::socket socket, Peer peer) {
-        on_connection(over_tcp(std::move(socket), std::move(peer), peer_timeout, tls));
-      });
-}
-
-std::shared_ptr<Listener> listen_tcp(asio::io_context& io, const NetConfig& config,
                                      OnSocket on_socket) {
   return std::make_shared<TcpListener>(io, config, std::move(on_socket));
 }

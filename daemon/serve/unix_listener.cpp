@@ -125,7 +125,7 @@ class UnixListener : public Listener {
 }  // namespace
 
 std::shared_ptr<Listener> listen_unix(asio::io_context& io, const NetConfig& config,
-                                      Listener::OnConnection on_connection) {
+                                      OnConnection on_connection) {
   return std::make_shared<UnixListener>(io, config, std::move(on_connection));
 }
 

@@ -140,8 +140,8 @@ std::string HonestClients::broken() const {
   return broken_;
 }
 
-Besieged::Besieged(const std::vector<std::string>& settings)
-    : sensor_(scene(), true, at_test_rate(settings), sanitizer_options()),
+Besieged::Besieged(const std::vector<std::string>& settings, const std::optional<client::Tls>& tls)
+    : sensor_(scene(), true, at_test_rate(settings), sanitizer_options(), tls),
       honest_(sensor_.connect("honest"), sensor_.connect("commander")) {}
 
 Besieged::~Besieged() { EXPECT_EQ(sensor_.daemon->stop(SIGTERM), 0) << sensor_.daemon->log(); }

@@ -5,6 +5,7 @@
 #include <atomic>
 #include <cstdint>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <thread>
 #include <vector>
@@ -85,8 +86,9 @@ class HonestClients {
 /// at its end that the daemon has not crashed.
 class Besieged {
  public:
-  /// `settings`: of the daemon, KEY=VALUE.
-  explicit Besieged(const std::vector<std::string>& settings = {});
+  /// `settings`: of the daemon, KEY=VALUE. `tls`: of the honest clients.
+  explicit Besieged(const std::vector<std::string>& settings = {},
+                    const std::optional<client::Tls>& tls = {});
   ~Besieged();
   Besieged(const Besieged&) = delete;
   Besieged& operator=(const Besieged&) = delete;

@@ -46,8 +46,8 @@ const fs::path& calibration_folder() {
 }
 
 Sensor::Sensor(const fs::path& scene, bool calibrated, const std::vector<std::string>& settings,
-               Environment daemon_environment)
-    : environment(std::move(daemon_environment)) {
+               Environment daemon_environment, std::optional<client::Tls> clients_tls)
+    : environment(std::move(daemon_environment)), tls(std::move(clients_tls)) {
   arguments = {"--set", "net.port=0", "--set", "state_dir=" + (folder.path() / "state").string()};
   const auto set = [&](const std::string& setting) {
     arguments.insert(arguments.end(), {"--set", setting});
@@ -62,6 +62,7 @@ Sensor::Sensor(const fs::path& scene, bool calibrated, const std::vector<std::st
 client::Options Sensor::options() const {
   client::Options options;
   options.port = daemon->port();
+  options.tls = tls;
   return options;
 }
 

@@ -4,6 +4,8 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -31,8 +33,10 @@ std::filesystem::path scene_file(const std::string& name);
 /// A daemon on the simulated sensor with a state folder, port and temp files of its own.
 struct Sensor {
   /// `scene` empty: the built-in one. `settings`: further KEY=VALUE. `environment`: of the daemon.
+  /// `tls`: of its clients.
   explicit Sensor(const std::filesystem::path& scene = {}, bool calibrated = true,
-                  const std::vector<std::string>& settings = {}, Environment environment = {});
+                  const std::vector<std::string>& settings = {}, Environment environment = {},
+                  std::optional<client::Tls> tls = {});
   Sensor(const Sensor&) = delete;
   Sensor& operator=(const Sensor&) = delete;
 
@@ -45,6 +49,7 @@ struct Sensor {
   TempFolder folder;
   std::vector<std::string> arguments;
   Environment environment;
+  std::optional<client::Tls> tls;
   std::unique_ptr<DaemonProcess> daemon;
 };
 

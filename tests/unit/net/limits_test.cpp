@@ -54,6 +54,26 @@ TEST(TokenBucket, KeepsAReserve) {
   EXPECT_TRUE(bucket.take(1, 4, start + milliseconds(500)));
 }
 
+TEST(Admission, GivesEachAddressItsHandshakes) {
+  int lines = 0;
+  NetConfig config;
+  config.log = [&](const LogLine& line) {
+    ++lines;
+    EXPECT_EQ(line.subject, LogSubject::unauthenticated);
+    EXPECT_THAT(line.text, HasSubstr("10.0.0.7:1: more than 100 TLS handshakes a second came"));
+  };
+  Admission admission(config);
+  const Peer greedy{"10.0.0.7:1", "", "10.0.0.7", false};
+  const auto began = TokenBucket::Clock::now();
+  int taken = 0;
+  for (int i = 0; i < 1000; ++i) taken += admission.take_handshake(greedy) ? 1 : 0;
+  const std::chrono::duration<double> took = TokenBucket::Clock::now() - began;
+  EXPECT_GE(taken, 100);
+  EXPECT_LE(taken, 101 + 100 * took.count());
+  EXPECT_EQ(lines, 1000 - taken);
+  EXPECT_TRUE(admission.take_handshake({"10.0.0.8:1", "", "10.0.0.8", false}));
+}
+
 // Before: the request was refused for ever.
 TEST(TokenBucket, WhatCostsMoreThanThereCanBeTakesAll) {
   const TokenBucket::Clock::time_point start;
