@@ -34,9 +34,19 @@ bool only_reads(v1::ClientMessage::RequestCase request) {
     case v1::ClientMessage::kGetReference:
     case v1::ClientMessage::kPing:
       return true;
-    default:
+    case v1::ClientMessage::kHello:
+    case v1::ClientMessage::kSubscribe:
+    case v1::ClientMessage::kSetLight:
+    case v1::ClientMessage::kSetCamera:
+    case v1::ClientMessage::kRezero:
+    case v1::ClientMessage::kSetReconstruction:
+    case v1::ClientMessage::kUploadCalibration:
+    case v1::ClientMessage::kActivateCalibration:
+    case v1::ClientMessage::kPinCalibration:
+    case v1::ClientMessage::REQUEST_NOT_SET:
       return false;
   }
+  return false;
 }
 
 v1::Reply done() {

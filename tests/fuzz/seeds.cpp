@@ -91,6 +91,10 @@ void add_requests(const Corpus& corpus) {
          m.mutable_subscribe()->set_events(false);
        })},
       {"get_reference", request([](M& m) { m.mutable_get_reference(); })},
+      {"pin_calibration", request([](M& m) {
+         m.mutable_pin_calibration()->set_number(3);
+         m.mutable_pin_calibration()->set_pinned(true);
+       })},
       {"ping", request([](M& m) { m.mutable_ping(); })},
       {"set_camera", request([](M& m) {
          m.mutable_set_camera()->set_exposure_us(4170);

@@ -111,7 +111,7 @@ def draw(group, rows, methods, nominal, folder):
                     axis.plot(i, 2, "x", ms=5, color=colour)
             axis.axhline(2 * nominal[method], color=colour, lw=0.7, ls=":")
         axis.set_yscale("log")
-        axis.set_ylim(0.008, 2.5)
+        axis.set_ylim(0.005, 2.5)
         values = [f"{r.value:g}" for r in row["runs"][methods[0]]]
         axis.set_xticks(range(len(values)), values, fontsize=7)
         axis.tick_params(axis="y", labelsize=7)

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Checks who includes whom, against the folder map of README.md.
+"""Checks who includes whom, against the folder map of ARCHITECTURE.md.
 
 Each room names the rooms whose headers it may include; its own are always allowed. System and
 library headers are checked for the rooms whose point is to know none.
