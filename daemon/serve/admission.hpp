@@ -36,7 +36,7 @@ class Admission {
   /// daemon.
   static constexpr std::size_t kReserved = 4;
   /// TLS handshakes a second that one address gets, and as many at once after a rest. A stranger
-  /// may ask for them, and each costs more than a frame of a summary: some 0.3 ms of the thread
+  /// may ask for them, and each costs more than a frame of a summary: some 0.4 ms of the thread
   /// that sends the frames.
   static constexpr double kHandshakesPerS = 100;
 

@@ -88,7 +88,7 @@ class Handshakes : public testing::Test {
   std::unique_ptr<SSL_CTX, Free> context_;
 };
 
-// Before: 9.6 MiB were left.
+// Before: 7.5 to 9.6 MiB were left.
 TEST_F(Handshakes, ThousandsThatAreLeftHalfDone) {
   const std::string hello = client_hello();
   std::vector<base::UniqueFd> peers;
@@ -100,7 +100,7 @@ TEST_F(Handshakes, ThousandsThatAreLeftHalfDone) {
   daemon_.end("4000 TLS handshakes that are left half done");
 }
 
-// Before: as many as the daemon had time for, and a viewer got 43 of 55 frames a second.
+// Before: as many as the daemon had time for, 7,271 in 3.7 s, each of 0.4 ms.
 TEST_F(Handshakes, OneAddressGetsAHundredASecond) {
   std::atomic<bool> stop{false};
   std::atomic<int> done{0};
