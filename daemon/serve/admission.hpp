@@ -35,9 +35,9 @@ class Admission {
   /// Places above NetConfig::max_clients for those with Peer.trusted, so that root reaches a full
   /// daemon.
   static constexpr std::size_t kReserved = 4;
-  /// TLS handshakes a second that one address gets, and as many at once after a rest. A stranger
-  /// may ask for them, and each costs more than a frame of a summary: some 0.4 ms of the thread
-  /// that sends the frames.
+  /// TLS handshakes per second that one address gets, and as many at once after a rest. An
+  /// unauthenticated client may ask for them, and each takes some 0.4 ms of the thread that sends
+  /// the frames.
   static constexpr double kHandshakesPerS = 100;
 
   /// Throws as read_tokens().
@@ -89,7 +89,7 @@ class Admission {
   [[nodiscard]] std::chrono::milliseconds delay_after_wrong(const std::string& host);
   std::map<std::string, Wrong> wrong_;  ///< … by Peer.host.
 
-  /// Beyond it all are forgotten: so many addresses have so many bursts of their own anyway.
+  /// Beyond it all are forgotten: each of 1,024 addresses has a burst of its own anyway.
   static constexpr std::size_t kMaxHandshakeHosts = 1024;
   std::map<std::string, TokenBucket> handshakes_;  ///< By Peer.host.
 

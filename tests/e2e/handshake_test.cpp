@@ -1,5 +1,5 @@
-// Strangers who ask for TLS handshakes: the honest clients beside them are served, and nothing is
-// left of the strangers. Times are printed, since a test machine has delays of its own.
+// Unauthenticated clients that ask for TLS handshakes: the honest clients beside them are served,
+// and nothing is left of the others. Times are printed, since a test machine has delays of its own.
 #include <arpa/inet.h>
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -106,9 +106,9 @@ TEST_F(Handshakes, OneAddressGetsAHundredASecond) {
   std::atomic<int> done{0};
   std::atomic<int> refused{0};
   const auto began = Clock::now();
-  std::vector<std::thread> strangers;
+  std::vector<std::thread> flood;
   for (int i = 0; i < 4; ++i) {
-    strangers.emplace_back([&] {
+    flood.emplace_back([&] {
       while (!stop) {
         const base::UniqueFd fd = knock("127.0.0.2");
         const auto one = ssl();
@@ -119,7 +119,7 @@ TEST_F(Handshakes, OneAddressGetsAHundredASecond) {
   }
   EXPECT_TRUE(daemon_.honest().receive(180)) << daemon_.honest().broken();
   stop = true;
-  for (std::thread& stranger : strangers) stranger.join();
+  for (std::thread& thread : flood) thread.join();
   const std::chrono::duration<double> took = Clock::now() - began;
   EXPECT_GE(done, 50);
   EXPECT_LE(done, 100 * (took.count() + 1) + 1);

@@ -563,12 +563,12 @@ class Security(unittest.TestCase):
             self.assertEqual(len(frame.depth.data), 582 * 570 * 2)
         with self.assertRaises((Closed, ConnectionError)):
             request(gate.port, "/")
-        # A stranger's: each handshake costs the gateway a signature. Before: as many as there was time for.
-        strangers = [connect(gate.port) for _ in range(600)]
+        # Each handshake of an unauthenticated client costs a signature. Before: as many as there was time for.
+        flood = [connect(gate.port) for _ in range(600)]
         time.sleep(2)
         self.assertEqual(request(gate.port, "/sensors", tls=context)[0], 200)
-        for stranger in strangers:
-            stranger.close()
+        for one in flood:
+            one.close()
         self.assertEqual(gate.stop(), 0)
         self.assertIn("more than 100 TLS handshakes a second came from", gate.text())
 
