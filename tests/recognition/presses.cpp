@@ -124,7 +124,7 @@ bool make_presses(const Wanted& wanted, const TakePress& take) {
   add_press(scene, sim::ball(4), 0.8 * thickness, draw.uniform(-1, 1), draw.uniform(-1, 1));
   for (int i = 0; i < wanted.presses; ++i) {
     Press press;
-    press.press = i;
+    press.number = i;
     press.thickness_mm = thickness;
     std::tie(press.kind, press.variant) = wanted.object(draw);
     const sim::Object object = draw_object(press.kind, press.variant, draw);

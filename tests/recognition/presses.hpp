@@ -14,7 +14,7 @@ namespace dtact::recognition {
 struct Press {
   int kind = 0;  ///< Index into kinds().
   int variant = 0;
-  int press = 0;            ///< Number on its sensor; the frames of one press share it.
+  int number = 0;           ///< On its sensor; the frames of one press share it.
   double thickness_mm = 0;  ///< Of the gel.
   double depth_mm = 0;
   double x_mm = 0;

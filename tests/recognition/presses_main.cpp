@@ -73,7 +73,7 @@ void make(Arguments& arguments) {
                                   static_cast<std::streamsize>(um.size() * sizeof(um[0])));
                        truth << fmt::format(
                            "{},{:.3f},{},{},{},{:.3f},{:.2f},{:.2f},{:.2f},{:.3f},{:.2f},{:.3f}\n",
-                           sensor, press.thickness_mm, press.kind, press.variant, press.press,
+                           sensor, press.thickness_mm, press.kind, press.variant, press.number,
                            press.depth_mm, press.x_mm, press.y_mm, press.newtons, map.deepest_mm,
                            map.area_mm2, map.cut);
                        if (images.is_open()) write_square(image, images);
@@ -94,9 +94,8 @@ void make(Arguments& arguments) {
 int main(int argc, char** argv) {
   try {
     CLI::App app(
-        "Writes simulated presses: maps.i16 (96 x 96 values each, micrometres, int16), truth.csv "
-        "and, "
-        "if asked for, images.u8.",
+        "Writes simulated presses: maps.i16 (96 x 96 values each, micrometres, int16), truth.csv; "
+        "with --images the camera images, images.u8.",
         "recognition_presses");
     Arguments arguments;
     app.add_option("folder", arguments.folder, "folder for the files")->required();
