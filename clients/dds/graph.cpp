@@ -30,8 +30,11 @@ dds_entity_t checked(dds_entity_t entity, std::string_view what) {
 }
 
 /// On this machine alone nothing is sent by multicast, and messages of up to 64 kB travel in one
-/// packet. Participants of this machine are asked for by unicast, as some do not listen to
-/// multicast.
+/// packet. Over a network a packet is whole in an Ethernet frame, also through WireGuard (1,420
+/// bytes): Linux waits 30 s for the rest of a datagram in parts, which fills its 4 MB within a
+/// second where 1 % of them is lost, and gives up those that others overtake; then no map arrives
+/// any more (tests/MEASURED.md, "ROS 2 graph"). Participants of this machine are asked for by
+/// unicast, as some do not listen to multicast.
 std::string settings_of(const Graph::Config& config) {
   const bool local = config.interfaces.empty();
   std::string interfaces;
@@ -52,7 +55,7 @@ std::string settings_of(const Graph::Config& config) {
       interfaces,
       local ? "<AllowMulticast>false</AllowMulticast><MaxMessageSize>65500B</MaxMessageSize>"
               "<FragmentSize>63000B</FragmentSize>"
-            : "",
+            : "<MaxMessageSize>1380B</MaxMessageSize><FragmentSize>1280B</FragmentSize>",
       peers);
 }
 
