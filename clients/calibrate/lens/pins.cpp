@@ -145,6 +145,7 @@ double height_noise(const Darkening& image, const PinFit& fit, const Lens& lens,
   return fit.height_noise(at_nearest(image.noise, project(lens, mm)));
 }
 
+/// Throws FitFailed where no lens goes through the lattice's pins.
 Settled settle(const Darkening& image, const Lattice& lattice, const Board& board) {
   constexpr int kRounds = 3;
   Settled settled{&lattice, {}, {}, {}, 0};
@@ -340,7 +341,12 @@ PinPress find_pins(const cv::Mat1f& reference, const cv::Mat1f& frame, const Boa
   lattices.resize(std::min(lattices.size(), kTries));
   Settled best;
   for (const Lattice& lattice : lattices) {
-    Settled settled = settle(image, lattice, board);
+    Settled settled;
+    try {
+      settled = settle(image, lattice, board);
+    } catch (const FitFailed&) {
+      continue;  // too few of its pins were found, or they lie on a line; another may be the board
+    }
     // The most pins; among windows and scales with equally many the most regular one.
     const bool better =
         best.lattice == nullptr || settled.missing.size() < best.missing.size() ||

@@ -21,12 +21,6 @@ constexpr LensModel kModels[] = {LensModel::affine,  LensModel::projective, Lens
                                  LensModel::radial2, LensModel::radial3,    LensModel::radial4};
 constexpr std::size_t kHomography = 8;
 
-/// The solver found no usable parameters.
-class FitFailed : public std::runtime_error {
- public:
-  using std::runtime_error::runtime_error;
-};
-
 std::size_t radial_terms(LensModel model) {
   return static_cast<std::size_t>(std::max(0, static_cast<int>(model) - 1));
 }
@@ -127,7 +121,7 @@ Parameters affine_start(std::span<const Mark> marks, const Units& u, std::size_t
   constexpr double kLine = 1e-3;
   const Eigen::BDCSVD<Eigen::MatrixXd> svd(a, Eigen::ComputeThinU | Eigen::ComputeThinV);
   if (svd.singularValues()[2] < kLine * svd.singularValues()[0]) {
-    throw std::runtime_error("lens: the points lie on a line; use a board with several rows");
+    throw FitFailed("lens: the points lie on a line; use a board with several rows");
   }
   const Eigen::MatrixXd x = svd.solve(b);
   Parameters p(kHomography + 2 + terms, 0.0);
@@ -164,7 +158,7 @@ void minimise(Parameters& p, const Units& u, std::span<const Mark> marks, LensMo
 /// The best parameters for all marks, in `u`.
 Parameters fit(std::span<const Mark> marks, const Units& u, LensModel model) {
   if (marks.size() < static_cast<std::size_t>(parameters(model))) {
-    throw std::runtime_error("lens: too few points");
+    throw FitFailed("lens: too few points");
   }
   Parameters p = affine_start(marks, u, radial_terms(model));
   // The larger model starts at the smaller one's result: a lens's terms are correlated.

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <span>
+#include <stdexcept>
 #include <vector>
 
 #include "daemon/recon/lens.hpp"
@@ -24,9 +25,14 @@ enum class LensModel {
 };
 [[nodiscard]] int parameters(LensModel model);
 
+/// There are fewer marks than parameters, they lie on a line, or the solver fails.
+class FitFailed : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
 /// The lens that minimises the squared distances in pixels (by Ceres, from the best affine map
-/// through the smaller models). Throws std::runtime_error when there are fewer marks than
-/// parameters, they lie on a line, or the solver fails.
+/// through the smaller models). Throws FitFailed.
 [[nodiscard]] recon::Lens fit_lens(std::span<const Mark> marks, LensModel model);
 
 /// Distances in millimetres on the surface between each mark's nominal position and the lens's

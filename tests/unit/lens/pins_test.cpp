@@ -172,6 +172,43 @@ TEST(Pins, MoreThanATenthMissingIsRefused) {
                   AllOf(HasSubstr("7 of 63 pins not found"), HasSubstr("row 3, column 3"))));
 }
 
+TEST(Pins, ATenthMayBeMissing) {
+  Scene scene;
+  scene.board = {5, 6, 3.5};
+  scene.missing = {{0, 2}, {2, 4}, {4, 1}};
+  const PinPress press = scene.find();
+  EXPECT_EQ(press.marks.size(), 27U);
+  EXPECT_THAT(press.missing,
+              testing::ElementsAre("row 1, column 3", "row 3, column 5", "row 5, column 2"));
+  scene.missing.insert({3, 3});
+  EXPECT_THAT([&] { (void)scene.find(); },
+              ThrowsMessage<std::runtime_error>(HasSubstr("4 of 30 pins not found")));
+}
+
+// Half of the pins still are a board: the others are named.
+TEST(Pins, HalfOfABoardIsNamed) {
+  Scene scene;
+  scene.board = {4, 6, 3.5};
+  const std::set<std::pair<int, int>> shown = {{0, 0}, {0, 1}, {0, 2}, {0, 3}, {0, 4}, {0, 5},
+                                               {1, 0}, {1, 5}, {2, 0}, {3, 0}, {3, 1}, {3, 2}};
+  for (int pin = 0; pin < 24; ++pin) {
+    if (!shown.contains({pin / 6, pin % 6})) scene.missing.insert({pin / 6, pin % 6});
+  }
+  EXPECT_THAT([&] { (void)scene.find(); },
+              ThrowsMessage<std::runtime_error>(
+                  AllOf(HasSubstr("12 of 24 pins not found"), HasSubstr("row 4, column 6 "))));
+}
+
+// Other scales and places have lattices of which fewer pins are found than a lens has parameters.
+// Before: "lens: too few points".
+TEST(Pins, HasNoLatticeWhereMostPinsOfASmallBoardAreMissing) {
+  Scene scene;
+  scene.board = {3, 4, 3.5};
+  scene.missing = {{1, 1}, {1, 2}, {1, 3}, {2, 1}, {2, 2}, {2, 3}};
+  EXPECT_THAT([&] { (void)scene.find(); },
+              ThrowsMessage<std::runtime_error>(HasSubstr("board: ")));
+}
+
 // A lens takes twelve marks. Before: "too few points".
 TEST(Pins, MissingOnesOfASmallBoardAreNamed) {
   Scene scene;
