@@ -408,9 +408,14 @@ class Setup {
     add("--lens", options_.lens);
     add("--crop", options_.crop);
     const std::string made = folder + "/calibration";
-    const bool older = fs::exists(made);
+    // An earlier session's may lie there, and an interrupted one makes it anew.
+    const auto written = [&made] {
+      std::error_code absent;
+      return fs::last_write_time(made, absent);
+    };
+    const fs::file_time_type before = written();
     if (run_program(command, context_.out) == 0) return;
-    if (!older && fs::exists(made)) {
+    if (written() != before) {
       Command upload = {"dtactctl"};
       add_target(upload);
       upload.insert(upload.end(), {"calibration", "upload", made});
@@ -418,7 +423,7 @@ class Setup {
                          fmt::format("{} is made but not in use; put it in use with: {}", made,
                                      fmt::join(upload, " ")));
     }
-    stop(fmt::format("there is no calibration yet; what was taken is in {} (--folder: another one)",
+    stop(fmt::format("no calibration was made; what was taken is in {} (--folder: another one)",
                      folder));
   }
 

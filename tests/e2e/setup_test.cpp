@@ -113,6 +113,9 @@ TEST_F(Setup, FromAnotherCameraToDepth) {
   // All of them: the calibration stays.
   EXPECT_EQ(setup({"--camera", "sim"}), 0) << output_;
   EXPECT_THAT(output_, HasSubstr("is calibrated, by dtact-calibration; dtactctl setup calibrate"));
+  // A session that ends early: the folder's calibration is the earlier one.
+  EXPECT_EQ(setup({"calibrate", "--radius-mm", "4.0", "--mm-per-px", "0.0413793"}), kNotMet);
+  EXPECT_THAT(output_, HasSubstr("no calibration was made; what was taken is in "));
 }
 
 TEST_F(Setup, ReachesADaemonWithoutTcpByItsSocket) {
