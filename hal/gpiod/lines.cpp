@@ -10,6 +10,8 @@
 #include <system_error>
 #include <utility>
 
+#include "hal/base/device_allow.hpp"
+
 namespace dtact::hal::gpiod {
 namespace {
 
@@ -17,7 +19,7 @@ namespace fs = std::filesystem;
 
 struct Survey {
   std::vector<Chip> chips;
-  bool denied = false;  // another chip is there, which this user may not open
+  int denied = 0;  // EACCES or EPERM: another chip is there, which this program may not open
 };
 
 Survey survey() {
@@ -32,7 +34,7 @@ Survey survey() {
     if (fs::is_symlink(path, ignored)) continue;
     ChipFacts facts = read_chip(path);
     if (facts.error == 0) survey.chips.push_back(std::move(facts.chip));
-    if (facts.error == EACCES || facts.error == EPERM) survey.denied = true;
+    if (facts.error == EACCES || facts.error == EPERM) survey.denied = facts.error;
   }
   // Raspberry Pi OS links gpiochip4 to gpiochip0, for programs from before kernel 6.6.45
   // (raspberrypi-sys-mods, 60-gpiochip4.rules).
@@ -116,10 +118,12 @@ std::unique_ptr<OutputLine> open_output(const GpioLineConfig& line, bool active,
   };
   const Survey here = survey();
   const Place place = find_line(here.chips, line, key);
-  if (place.unknown && here.denied) {
-    throw fail(std::strerror(EACCES),
-               "put the user into the group that owns it (sudo usermod -aG gpio <user>) and "
-               "install config/udev/60-dtactd.rules");
+  if (place.unknown && here.denied != 0) {
+    throw fail(std::strerror(here.denied),
+               here.denied == EPERM
+                   ? base::kDeviceAllowFix
+                   : "put the user into the group that owns it (sudo usermod -aG gpio <user>) and "
+                     "install config/udev/60-dtactd.rules");
   }
   if (!place.why.empty()) throw fail(place.why, place.fix);
   int error = 0;
