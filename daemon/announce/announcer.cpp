@@ -104,6 +104,8 @@ struct Announcer::Impl : std::enable_shared_from_this<Impl> {
   void on_added(sd_bus_message*) { commit(); }
   void on_committed(sd_bus_message*) {}
   void on_state_changed(sd_bus_message* message);
+  /// As it is on the network.
+  [[nodiscard]] std::string published_name() const;
 
   asio::posix::stream_descriptor descriptor;  ///< A duplicate: Asio closes what it watches.
   asio::steady_timer timer;
@@ -231,11 +233,15 @@ void Announcer::Impl::on_group(sd_bus_message* message) {
   add_service(path);
 }
 
+std::string Announcer::Impl::published_name() const {
+  const std::string number = alternative > 1 ? fmt::format(" #{}", alternative) : "";
+  return base::first_bytes(published.name, kMaxName - number.size()) + number;
+}
+
 void Announcer::Impl::add_service(const char* path) {
   group = path;
   published = ask();
-  const std::string number = alternative > 1 ? fmt::format(" #{}", alternative) : "";
-  const std::string name = base::first_bytes(published.name, kMaxName - number.size()) + number;
+  const std::string name = published_name();
   sd_bus_message* made = nullptr;
   check(sd_bus_message_new_method_call(bus.get(), &made, kAvahi, path, kGroup, "AddService"));
   const Message message(made);
@@ -273,9 +279,8 @@ void Announcer::Impl::on_state_changed(sd_bus_message* message) {
 
 void Announcer::Impl::on_state(std::int32_t state, const std::string& error) {
   if (state == kEstablished) {
-    const std::string number = alternative > 1 ? fmt::format(" #{}", alternative) : "";
-    set_state(fmt::format("announced as \"{}{}\" ({}, port {})", published.name, number,
-                          wire::kServiceType, published.port));
+    set_state(fmt::format("announced as \"{}\" ({}, port {})", published_name(), wire::kServiceType,
+                          published.port));
   } else if (state == kCollision) {
     ++alternative;
     withdraw();
