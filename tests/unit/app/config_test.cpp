@@ -159,6 +159,80 @@ TEST_F(ConfigFile, WhatAStartRefusesIsRefused) {
   EXPECT_EQ(load("[capture]\nfifo_priority = 0\n").pipeline.fifo_priority, 0);
 }
 
+/// A key's range as config/dtactd.toml states it, with the next values outside.
+struct Range {
+  const char* key;
+  const char* below;
+  const char* least;
+  const char* most;
+  const char* above;
+};
+
+TEST_F(ConfigFile, EveryNumberHasTheRangeThatTheShippedFileStates) {
+  constexpr Range kRanges[] = {
+      {"camera.width", "15", "16", "8192", "8193"},
+      {"camera.height", "15", "16", "8192", "8193"},
+      {"camera.fps", "0.09", "0.1", "1000", "1000.1"},
+      {"camera.light_delay_frames", "-1", "0", "64", "65"},
+      {"ring.brightness", "-1", "0", "255", "256"},
+      {"ring.ws2812.gamma", "0.19", "0.2", "5", "5.1"},
+      {"ring.ws2812.first_led", "-1", "0", "7", "8"},
+      {"capture.fifo_priority", "-1", "0", "99", "100"},
+      {"reconstruction.max_error_um", "0.9", "1", "10000", "10000.1"},
+      {"reference.frames", "0", "1", "256", "257"},
+      {"reference.settle_frames", "1", "2", "64", "65"},
+      {"reference.settle_grey", "0.009", "0.01", "16", "16.1"},
+      {"reference.drift_limit_percent", "-0.1", "0", "5", "5.1"},
+      {"reference.drift_percent_per_minute", "0.009", "0.01", "60", "60.1"},
+      {"contact.area_mm2", "0.0009", "0.001", "1000", "1000.1"},
+      {"contact.debounce_frames", "0", "1", "1000", "1001"},
+      {"net.port", "-1", "0", "65535", "65536"},
+      {"net.max_clients", "0", "1", "1024", "1025"},
+      {"net.max_clients_per_address", "0", "1", "1024", "1025"},
+      {"net.max_requests_per_s", "0", "1", "100000", "100001"},
+      {"net.hello_timeout_ms", "99", "100", "600000", "600001"},
+      {"net.peer_timeout_ms", "999", "1000", "600000", "600001"},
+      {"metrics.port", "-1", "0", "65535", "65536"}};
+  for (const Range& range : kRanges) {
+    const std::string key = range.key;
+    for (const char* value : {range.least, range.most}) {
+      EXPECT_EQ(error("", {key + "=" + value}), "no error") << key;
+    }
+    for (const char* value : {range.below, range.above}) {
+      EXPECT_THAT(error("", {key + "=" + value}),
+                  AllOf(HasSubstr(key), HasSubstr(std::string(range.least) + " … " + range.most)))
+          << value;
+    }
+  }
+}
+
+// Where one key's range depends on another's value.
+TEST_F(ConfigFile, RangesThatDependOnOthersReachTheirEnds) {
+  EXPECT_EQ(error("", {"contact.threshold_mm=0.005", "contact.release_mm=0.001"}), "no error");
+  EXPECT_EQ(error("", {"contact.threshold_mm=5", "contact.release_mm=4.999"}), "no error");
+  EXPECT_THAT(error("", {"contact.threshold_mm=0.0049", "contact.release_mm=0.001"}),
+              HasSubstr("0.005 … 5"));
+  EXPECT_THAT(error("", {"contact.threshold_mm=5.1"}), HasSubstr("0.005 … 5"));
+  EXPECT_THAT(error("", {"contact.release_mm=0.0009"}), HasSubstr("0.001 … 5"));
+
+  EXPECT_EQ(error("", {"reference.frames=1", "reference.settle_frames=12",
+                       "reference.timeout_frames=12"}),
+            "no error");
+  EXPECT_THAT(error("", {"reference.frames=13", "reference.settle_frames=2",
+                         "reference.timeout_frames=12"}),
+              HasSubstr("at least reference.frames = 13"));
+
+  // As high as the capture thread's it would delay frames.
+  EXPECT_EQ(error("", {"net.fifo_priority=39"}), "no error");
+  EXPECT_THAT(error("", {"net.fifo_priority=40"}), HasSubstr("clients would delay frames"));
+  EXPECT_EQ(error("", {"capture.fifo_priority=1", "net.fifo_priority=0"}), "no error");
+  EXPECT_THAT(error("", {"capture.fifo_priority=1", "net.fifo_priority=1"}),
+              HasSubstr("clients would delay frames"));
+  EXPECT_EQ(error("", {"capture.fifo_priority=0", "net.fifo_priority=99"}), "no error");
+  EXPECT_THAT(error("", {"capture.fifo_priority=0", "net.fifo_priority=100"}), HasSubstr("0 … 99"));
+  EXPECT_THAT(error("", {"net.fifo_priority=-1"}), HasSubstr("0 … 99"));
+}
+
 TEST_F(ConfigFile, FramesAreDecodedAtASizeOfWholePixels) {
   EXPECT_THAT(error("[camera]\nwidth = 642\ndecode_scale = 4\n"),
               AllOf(HasSubstr("camera.decode_scale = 4"), HasSubstr("642x600")));

@@ -156,6 +156,10 @@ TEST(Upload, NamesWhatIsWrong) {
   expect_invalid(client, upload("..", "good"), "upload_calibration.name");
   expect_invalid(client, upload("a.b", "good"), "upload_calibration.name");
   expect_invalid(client, upload(std::string(65, 'x'), "good"), "upload_calibration.name");
+  // The characters beside those that are allowed.
+  for (const char c : std::string("@[`{/:,")) {
+    expect_invalid(client, upload(std::string("a") + c, "good"), "upload_calibration.name");
+  }
   // Byte 64 is within a character.
   std::string accents = "a";
   for (int i = 0; i < 40; ++i) accents += "\xc3\xa9";
@@ -163,6 +167,18 @@ TEST(Upload, NamesWhatIsWrong) {
   expect_invalid(client, upload("x", ""), "calibration_toml or reference_png is empty");
   expect_invalid(client, upload("x", "bad"), "calibration.toml:3: scale missing");
   EXPECT_TRUE(client.request(upload("x", "good")).has_done());  // none of them is in the way
+}
+
+TEST(Upload, TakesEveryNameThatIsAllowed) {
+  Rig rig({}, answer_done);
+  RawClient client(rig.tcp_port());
+  client.hello();
+  for (const std::string& name : {std::string("azAZ09-_"), std::string("0"), std::string("-"),
+                                  "m" + std::string(62, '5') + "M"}) {
+    EXPECT_TRUE(client.request(upload(name, "good")).has_done()) << name;
+    be_calibrated(rig);
+    EXPECT_EQ(client.request(get_calibration()).calibration().name(), name);
+  }
 }
 
 TEST(Upload, IsNotKeptWhenThePipelineRefusesIt) {

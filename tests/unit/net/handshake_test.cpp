@@ -103,6 +103,18 @@ TEST(Handshake, RefusesALongProgramName) {
   EXPECT_TRUE(client.request(message).has_hello());
 }
 
+TEST(Handshake, RefusesALongToken) {
+  const Rig rig;
+  RawClient client(rig.tcp_port());
+  auto message = hello(1);
+  message.mutable_hello()->set_token(std::string(257, 'x'));
+  const auto reply = client.request(message);
+  EXPECT_EQ(reply.error().code(), v1::ERROR_INVALID);
+  EXPECT_THAT(reply.error().message(), HasSubstr("hello.token: 257 bytes, at most 256"));
+  message.mutable_hello()->set_token(std::string(256, 'x'));
+  EXPECT_TRUE(client.request(message).has_hello()) << "without a token file any token will do";
+}
+
 TEST(Handshake, EndsAfterSilence) {
   NetConfig config;
   config.hello_timeout = std::chrono::milliseconds(50);

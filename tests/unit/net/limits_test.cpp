@@ -54,6 +54,21 @@ TEST(TokenBucket, KeepsAReserve) {
   EXPECT_TRUE(bucket.take(1, 4, start + milliseconds(500)));
 }
 
+TEST(TokenBucket, ACostAboveTheBurstTakesAllOfIt) {
+  const TokenBucket::Clock::time_point start;
+  TokenBucket bucket(10, 3, start);
+  EXPECT_TRUE(bucket.take(7, 0, start));
+  EXPECT_FALSE(bucket.take(1, 0, start));
+  EXPECT_FALSE(bucket.take(7, 0, start + milliseconds(299)));
+  EXPECT_TRUE(bucket.take(7, 0, start + milliseconds(301)));
+  // All but the reserve.
+  TokenBucket reserved(10, 3, start);
+  EXPECT_TRUE(reserved.take(7, 1, start));
+  EXPECT_FALSE(reserved.take(1, 1, start));
+  EXPECT_TRUE(reserved.take(1, 0, start));
+  EXPECT_FALSE(reserved.take(1, 0, start));
+}
+
 TEST(Admission, GivesEachAddressItsHandshakes) {
   int lines = 0;
   NetConfig config;
@@ -315,8 +330,14 @@ TEST(Incoming, OnlyAPlainUploadMayBeLarge) {
     return all;
   };
   EXPECT_TRUE(is_plain_upload(whole + times(14, unknown)));
+  EXPECT_FALSE(is_plain_upload(whole + times(15, unknown)));
   EXPECT_FALSE(is_plain_upload(whole + times(20, unknown)));
   EXPECT_FALSE(is_plain_upload(times(40'000, unknown)));
+  v1::ClientMessage behalf = upload;
+  behalf.set_on_behalf_of(std::string(256, 'w'));
+  EXPECT_TRUE(is_plain_upload(behalf.SerializeAsString()));
+  behalf.set_on_behalf_of(std::string(257, 'w'));
+  EXPECT_FALSE(is_plain_upload(behalf.SerializeAsString()));
   EXPECT_FALSE(is_plain_upload(whole + "\xfb\x01\xfc\x01"s)) << "a group may hold any number";
   v1::ClientMessage leds;
   leds.set_id(8);
@@ -471,6 +492,29 @@ TEST(WrongTokens, AreAnsweredLaterAndLater) {
   // A client that shares the address with a guesser is served at once.
   EXPECT_EQ(admission.enter(guesser, "0123456789abcdef0123456789abcdef").grant->rights,
             Rights::control);
+}
+
+// Of 1024 addresses the wrong tokens are remembered; the one that is heard of no more goes first.
+TEST(WrongTokens, AreRememberedOfSoManyAddresses) {
+  using namespace std::chrono_literals;
+  const calibration::TempFolder folder;
+  NetConfig config;
+  config.token_file = folder.path() / "tokens";
+  base::write_file_atomically(config.token_file,
+                              "view " + wire::token_hash("0123456789abcdef0123456789abcdef") + "\n",
+                              0600);
+  Admission admission(config);
+  const auto guess = [&](int host) {
+    const std::string address = "2001:db8::" + std::to_string(host);
+    return admission.enter({"[" + address + "]:4711", "[::]:7377", address, false}, "guess").delay;
+  };
+  EXPECT_EQ(guess(0), 500ms);
+  for (int host = 1; host <= 1023; ++host) EXPECT_EQ(guess(host), 500ms) << host;
+  EXPECT_EQ(guess(0), 1s) << "there was room for all";
+  EXPECT_EQ(guess(1024), 500ms);
+  EXPECT_EQ(guess(0), 2s);
+  EXPECT_EQ(guess(2), 1s);
+  EXPECT_EQ(guess(1), 500ms) << "it had lost its place";
 }
 
 TEST(Answers, AboveTheCapAreErrorsAndTheConnectionStays) {

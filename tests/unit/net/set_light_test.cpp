@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <string>
+#include <utility>
 #include <variant>
 
 #include "tests/unit/net/raw_client.hpp"
@@ -73,6 +74,28 @@ TEST(SetLight, TakesEightColours) {
   EXPECT_EQ(reply.light().leds(7).r(), 7U);
   EXPECT_EQ(reply.light().leds(7).g(), 0U);
   EXPECT_EQ(reply.light().leds(7).b(), 255U);
+}
+
+TEST(SetLight, TakesTheDarkestAndTheBrightest) {
+  Rig rig({}, answer_done);
+  RawClient client(rig.tcp_port());
+  client.hello();
+  for (const std::uint32_t value : {0U, 255U}) {
+    EXPECT_EQ(client.request(brightness(value)).light().brightness(), value);
+  }
+  v1::ClientMessage message;
+  for (std::uint32_t i = 0; i < 8; ++i) {
+    auto& led = *message.mutable_set_light()->add_leds();
+    led.set_r(i % 3 == 0 ? 255 : 0);
+    led.set_g(i % 3 == 1 ? 255 : 0);
+    led.set_b(i % 3 == 2 ? 255 : 0);
+  }
+  const auto light = client.request(message).light();
+  ASSERT_EQ(light.leds_size(), 8);
+  EXPECT_EQ(light.leds(6).r(), 255U);
+  EXPECT_EQ(light.leds(7).g(), 255U);
+  EXPECT_EQ(light.leds(5).b(), 255U);
+  EXPECT_EQ(light.leds(5).r(), 0U);
 }
 
 TEST(SetLight, NamesTheFieldThatIsWrong) {
@@ -221,6 +244,49 @@ TEST(SetCamera, PassesWhatIsInRangeAndAnswersWithWhatTheCameraHas) {
   message.mutable_set_camera()->set_exposure_us(4170);
   message.mutable_set_camera()->set_gain(2);
   expect_invalid(client, message, "set_camera.gain: this camera has no such control");
+}
+
+TEST(SetCamera, TakesTheEndsOfBothRanges) {
+  Rig rig({}, [](FakePort& port) {
+    pipeline::Status status;
+    status.camera.settings.exposure_us = {.value = 8300, .minimum = 100, .maximum = 50000};
+    status.camera.settings.gain = {.value = 2, .minimum = 1.5, .maximum = 7.75};
+    port.set_status(status);
+    answer_done(port);
+  });
+  RawClient client(rig.tcp_port());
+  client.hello();
+  std::size_t sent = 0;
+  for (const auto& [us, gain] : {std::pair{100.0, 7.75}, {50000.0, 1.5}}) {
+    v1::ClientMessage message;
+    message.mutable_set_camera()->set_exposure_us(us);
+    message.mutable_set_camera()->set_gain(gain);
+    const auto reply = client.request(message);
+    EXPECT_EQ(reply.camera().exposure_us().minimum(), 100);
+    EXPECT_EQ(reply.camera().gain().minimum(), 1.5);
+    EXPECT_EQ(reply.camera().gain().maximum(), 7.75);
+    const auto command = rig.port.wait_command(sent++);
+    ASSERT_TRUE(command.has_value());
+    const auto& change = std::get<pipeline::SetCamera>(command->what).change;
+    EXPECT_EQ(change.exposure_us, us);
+    EXPECT_EQ(change.gain, gain);
+  }
+  for (const double gain : {1.49, 7.76}) {
+    v1::ClientMessage message;
+    message.mutable_set_camera()->set_gain(gain);
+    expect_invalid(client, message, "this camera has 1.5 to 7.75");
+  }
+  // The first of two wrong ones is named; the right one is not passed on alone.
+  v1::ClientMessage both;
+  both.mutable_set_camera()->set_exposure_us(99);
+  both.mutable_set_camera()->set_gain(9);
+  expect_invalid(client, both, "set_camera.exposure_us: 99; this camera has 100 to 50000");
+  both.mutable_set_camera()->set_exposure_us(100);
+  expect_invalid(client, both, "set_camera.gain: 9");
+  // Without either it is a question.
+  v1::ClientMessage question;
+  question.mutable_set_camera();
+  EXPECT_EQ(client.request(question).camera().exposure_us().value(), 8300);
 }
 
 // Which settings a camera has is known once it has been opened.

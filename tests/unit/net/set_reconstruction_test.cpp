@@ -81,6 +81,22 @@ TEST(SetReconstruction, NamesTheFieldThatIsWrong) {
   }
 }
 
+TEST(SetReconstruction, TakesTheSmallestAndTheLargestError) {
+  Rig rig({}, answer_done);
+  RawClient client(rig.tcp_port());
+  client.hello();
+  for (const double bound : {1.0, 10000.0}) {
+    const auto reply =
+        client.request(asking([&](auto& change) { change.set_max_error_um(bound); }));
+    EXPECT_EQ(reply.reconstruction().max_error_um(), bound);
+    EXPECT_EQ(reply.reconstruction().resolution(), "full");
+  }
+  for (const double bound : {0.999, 10000.5}) {
+    expect_invalid(client, asking([&](auto& change) { change.set_max_error_um(bound); }),
+                   "allowed are 1 to 10000");
+  }
+}
+
 TEST(SetReconstruction, IsDoneOneAtATime) {
   Rig rig;
   RawClient client(rig.tcp_port());

@@ -1,12 +1,16 @@
 #include "daemon/serve/subscription.hpp"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <string>
 #include <utility>
+#include <variant>
+#include <vector>
 
 #include "proto/dtact.pb.h"
 
@@ -206,6 +210,106 @@ TEST(Subscription, RefusesRatesOutOfRangeByName) {
   for (const double hz : {0.0, 0.01, 1000.0}) {
     request.set_depth_hz(hz);
     EXPECT_EQ(Subscription::from(request, {}).index(), 0U) << hz;
+  }
+}
+
+/// Each rate by its name in dtact.proto.
+const std::vector<std::pair<std::string, void (*)(v1::Subscribe&, double)>> kRates{
+    {"depth_hz", [](v1::Subscribe& request, double hz) { request.set_depth_hz(hz); }},
+    {"luma_hz", [](v1::Subscribe& request, double hz) { request.set_luma_hz(hz); }},
+    {"jpeg_hz", [](v1::Subscribe& request, double hz) { request.set_jpeg_hz(hz); }},
+    {"summary_hz", [](v1::Subscribe& request, double hz) { request.set_summary_hz(hz); }},
+    {"cloud_hz", [](v1::Subscribe& request, double hz) { request.set_cloud_hz(hz); }},
+    {"pose_hz", [](v1::Subscribe& request, double hz) { request.set_pose_hz(hz); }},
+    {"recognition_hz", [](v1::Subscribe& request, double hz) { request.set_recognition_hz(hz); }}};
+
+TEST(Subscription, EveryRateHasTheSameRange) {
+  for (const auto& [name, set] : kRates) {
+    v1::Subscribe request;
+    for (const double hz : {0.0, 0.01, 1000.0}) {
+      set(request, hz);
+      EXPECT_EQ(Subscription::from(request, {}).index(), 0U) << name << " " << hz;
+    }
+    for (const double hz : {-0.01, 0.0099, 1000.01}) {
+      set(request, hz);
+      expect_refused(request, v1::ERROR_INVALID,
+                     "subscribe." + name + ": " + fmt::format("{}", hz) +
+                         "; allowed are 0 (no limit) and 0.01 to 1000");
+    }
+  }
+}
+
+/// What dtact-perceive sends of 13 frames of a subscription.
+std::string geometry_of(const v1::Subscribe& request) {
+  auto subscription = std::get<Subscription>(Subscription::from(request, {}, Serves::geometry));
+  std::string text;
+  for (int i = 0; i < 13; ++i) {
+    const auto parts = subscription.next(at(i), 0).parts;
+    text += i == 0 ? "" : " ";
+    if (parts == 0) text += '.';
+    if ((parts & Subscription::kCloud) != 0) text += 'c';
+    if ((parts & Subscription::kPose) != 0) text += 'p';
+    if ((parts & Subscription::kRecognition) != 0) text += 'r';
+  }
+  return text;
+}
+
+TEST(Subscription, EveryPartOfPerceiveHasItsOwnRate) {
+  v1::Subscribe request;
+  request.set_cloud(v1::CLOUD_INT16);
+  request.set_cloud_hz(30);
+  request.set_pose(true);
+  request.set_pose_hz(20);
+  request.set_recognition(true);
+  request.set_recognition_hz(10);
+  EXPECT_EQ(geometry_of(request), "cpr . c p c . cpr . c p c . cpr");
+}
+
+// A sensor's map is rarely square.
+TEST(Subscription, ABoxBeginsWithinTheMap) {
+  constexpr Subscription::Map kMap{.width = 500, .height = 400};
+  v1::Subscribe request;
+  auto& box = *request.mutable_box();
+  box.set_width(1);
+  box.set_height(1);
+  for (const auto& [x, y] : {std::pair{0U, 0U}, {499U, 0U}, {0U, 399U}, {499U, 399U}}) {
+    box.set_x(x);
+    box.set_y(y);
+    EXPECT_EQ(Subscription::from(request, kMap).index(), 0U) << x << ", " << y;
+  }
+  for (const auto& [x, y] : {std::pair{500U, 0U}, {0U, 400U}, {0U, 450U}, {4294967295U, 1U}}) {
+    box.set_x(x);
+    box.set_y(y);
+    const auto result = Subscription::from(request, kMap);
+    const auto* refusal = std::get_if<Refusal>(&result);
+    ASSERT_NE(refusal, nullptr) << x << ", " << y;
+    EXPECT_THAT(
+        refusal->sentence,
+        HasSubstr(fmt::format("begins at {}, {}, and the depth map has 500x400 pixels", x, y)));
+    EXPECT_EQ(Subscription::from(request, {}).index(), 0U) << "no map is known yet";
+  }
+}
+
+TEST(Subscription, TakesEveryDecimationUnitAndNumberOfPresses) {
+  for (const std::uint32_t decimation : {1U, 2U, 4U}) {
+    for (const std::uint32_t um : {1U, 2U, 5U, 10U}) {
+      v1::Subscribe request;
+      request.set_depth(v1::DEPTH_INT16);
+      request.set_decimation(decimation);
+      request.set_um_per_unit(um);
+      const DepthSpec spec = made(request).kind(Subscription::kDepth).spec;
+      EXPECT_EQ(spec.decimation, static_cast<int>(decimation));
+      EXPECT_EQ(spec.um_per_unit, static_cast<int>(um));
+    }
+  }
+  EXPECT_EQ(made({}).kind(Subscription::kDepth).spec, (DepthSpec{1, 1}));
+  for (const auto& [presses, joined] : {std::pair{0U, 1}, {1U, 1}, {10U, 10}}) {
+    v1::Subscribe request;
+    request.set_recognition(true);
+    request.set_recognition_presses(presses);
+    const auto from = Subscription::from(request, {}, Serves::geometry);
+    ASSERT_TRUE(std::holds_alternative<Subscription>(from)) << presses;
+    EXPECT_EQ(std::get<Subscription>(from).kind(Subscription::kRecognition).recognition, joined);
   }
 }
 

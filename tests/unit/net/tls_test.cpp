@@ -309,6 +309,11 @@ TEST_F(TlsServer, WarnsOfACertificateThirtyDaysBeforeItExpires) {
   Rig rig(config_);
   EXPECT_EQ(days_reported(rig), 31);
   EXPECT_THAT(rig.log(), Not(HasSubstr("expires in")));
+  pair.certificate = expiring(pair, 30);
+  write(pair);
+  rig.reload(config_);
+  EXPECT_EQ(days_reported(rig), 30);
+  EXPECT_THAT(rig.log(), Not(HasSubstr("expires in")));
   pair.certificate = expiring(pair, 29);
   write(pair);
   rig.reload(config_);

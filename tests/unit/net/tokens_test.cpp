@@ -137,6 +137,8 @@ TEST(PrivateFile, IsBounded) {
   const auto path = folder.path() / "tokens";
   base::write_file_atomically(path, std::string(64 * 1024 + 1, '#'), 0600);
   EXPECT_THAT(unreadable(path), HasSubstr("is larger than 65536 bytes"));
+  base::write_file_atomically(path, std::string(64 * 1024, '#'), 0600);
+  EXPECT_EQ(read_private_file(path, "the token file").size(), 65536U);
 }
 
 }  // namespace

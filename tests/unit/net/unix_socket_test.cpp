@@ -159,6 +159,17 @@ TEST_F(UnixSocket, NamesWhatIsWrongWithItsPath) {
   config_.unix_socket = folder_.path() / std::string(108, 'x');
   EXPECT_THAT(refusal(), HasSubstr("choose a shorter one"));
 }
+
+// unix(7): sun_path has 108 bytes, of which the last is 0.
+TEST_F(UnixSocket, ItsPathMayHave107Bytes) {
+  const std::size_t room = 107 - (folder_.path() / "").native().size();
+  config_.unix_socket = folder_.path() / std::string(room + 1, 'x');
+  EXPECT_THAT(refusal(), HasSubstr("108 bytes are more than a socket's path may have, 107"));
+  config_.unix_socket = folder_.path() / std::string(room, 'x');
+  const Rig rig(config_);
+  RawClient local{connected(config_.unix_socket)};
+  EXPECT_NO_THROW(local.hello());
+}
 // NOLINTEND(misc-const-correctness)
 
 }  // namespace
