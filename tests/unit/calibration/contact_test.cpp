@@ -101,6 +101,17 @@ TEST(RadialProfile, MeansOfRings) {
   EXPECT_LT(profile.shown[79], 0.8) << "rings that the map cuts off show less";
 }
 
+// The rings' middles are at 0.05, 0.15 and 0.25 mm.
+TEST(RadialProfile, IsReadBetweenTheMiddlesOfRings) {
+  const RadialProfile profile{0.1, {40, 30, 10}, {1, 1, 1}};
+  EXPECT_DOUBLE_EQ(profile.at(0), 40);
+  EXPECT_DOUBLE_EQ(profile.at(0.05), 40);
+  EXPECT_NEAR(profile.at(0.08), 37, 1e-9);
+  EXPECT_NEAR(profile.at(0.2), 20, 1e-9);
+  EXPECT_NEAR(profile.at(0.25), 10, 1e-9);
+  EXPECT_DOUBLE_EQ(profile.at(7), 10);
+}
+
 TEST(FarFieldDrift, AnEvenShiftIsDrift) {
   DarkeningMap map = Ball{.col = 250, .row = 200, .width = 500, .height = 400}.map();
   const Contact contact = find_contact(map, 4);

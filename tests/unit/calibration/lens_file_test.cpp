@@ -1,8 +1,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cstdint>
+#include <memory>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
 #include "daemon/calibration/sensor_files.hpp"
 #include "hal/base/atomic_file.hpp"
@@ -114,6 +117,47 @@ TEST_F(LensFileTest, ErrorsNameFileKeyAndFix) {
   // The surface's origin beside the frame, and mirrored.
   EXPECT_THAT([&] { (void)load("20, 0, 400", "20, 0, 4000"); }, says("lens"));
   EXPECT_THAT([&] { (void)load("[20, 0", "[-20, 0"); }, says("lens"));
+}
+
+// A lens counts millimetres from its own origin, a calibration from the middle of its map.
+TEST_F(LensFileTest, ACalibrationsFolderHasTheLensAndTheCamerasPlace) {
+  Calibration calibration = sample();
+  recon::Lens lens;
+  lens.homography = {20, 0, 4, 0, 20, 2.25, 0, 0, 1};
+  lens.centre_col = 5.5;
+  lens.centre_row = 4;
+  lens.radius_px = 10;
+  auto model = std::make_shared<recon::Model>(*calibration.model);
+  std::vector<std::uint8_t> outside;
+  model->rectify = make_lens_table(lens, 12, 9, {3, 2, 6, 5, model->mm_per_px}, outside);
+  calibration.model = model;
+  calibration.lens = lens;
+  calibration.view = {.foot_mm = {0.3, -0.2},
+                      .source = HeightSource::presses,
+                      .per_mm = 0.04,
+                      .per_level = 0,
+                      .error = 0.003};
+  save(calibration, path());
+  const LensFile file = load_lens(path());
+  EXPECT_EQ(file.frame_width, 12);
+  EXPECT_EQ(file.frame_height, 9);
+  EXPECT_EQ(file.lens.homography, lens.homography);
+  EXPECT_EQ(file.lens.centre_row, 4);
+  EXPECT_FALSE(file.gain_specified);
+  EXPECT_EQ(file.view.source, HeightSource::presses);
+  EXPECT_EQ(file.view.per_mm, 0.04);
+  EXPECT_EQ(file.view.error, 0.003);
+  // The map's middle is its pixel (2.5, 2), 1.5 and 1.75 pixels of 0.051 mm from the origin.
+  EXPECT_NEAR(file.view.foot_mm.x, 0.3 + 0.0765, 1e-9);
+  EXPECT_NEAR(file.view.foot_mm.y, -0.2 + 0.08925, 1e-9);
+}
+
+TEST_F(LensFileTest, ACalibrationWithoutALensHasNoneToGive) {
+  save(sample(), path());
+  EXPECT_THAT(
+      [&] { (void)load_lens(path()); },
+      ThrowsMessage<std::runtime_error>(AllOf(HasSubstr("lens.toml"), HasSubstr("has no lens"),
+                                              HasSubstr("dtact-calibrate lens"))));
 }
 
 TEST_F(LensFileTest, AFolderWithoutALensSaysHowToMakeOne) {

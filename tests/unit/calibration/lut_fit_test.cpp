@@ -7,6 +7,8 @@
 #include <cmath>
 #include <random>
 #include <stdexcept>
+#include <utility>
+#include <vector>
 
 #include "tests/unit/calibration/ball.hpp"
 #include "tests/unit/calibration/lut_reading.hpp"
@@ -84,6 +86,56 @@ TEST(FitLut, SaysWhenTheImageIsNoBall) {
   for (float& level : map.levels) level = level > 3 ? 20.0F : 0.0F;
   EXPECT_THAT([&] { (void)fit(map); },
               ThrowsMessage<std::runtime_error>(HasSubstr("does not darken steadily")));
+}
+
+// A curved response: its straight lines between the knots differ from any line through the origin.
+TEST(Interpolate, RunsFromTheOriginFromKnotToKnotAndEndsAtTheLast) {
+  const std::vector<Knot> knots{{4, 0.1, 5}, {10, 0.7, 3}, {12, 0.8, 1}};
+  EXPECT_NEAR(interpolate(knots, 1), 0.025, 1e-12);
+  EXPECT_NEAR(interpolate(knots, 4), 0.1, 1e-12);
+  EXPECT_NEAR(interpolate(knots, 7), 0.4, 1e-12);
+  EXPECT_NEAR(interpolate(knots, 11), 0.75, 1e-12);
+  EXPECT_NEAR(interpolate(knots, 12), 0.8, 1e-12);
+  EXPECT_NEAR(interpolate(knots, 30), 0.8, 1e-12);
+}
+
+// A press whose middle is 0.3 mm deep has in the three times larger ring about it a bulge of 0.1
+// mm. The third ring is not in the picture.
+TEST(MakeLut, GoesOnBeyondTheKnotsAndBalancesTheBulge) {
+  const RadialProfile profile{0.1, {20, -7, std::nan("")}, {1, 1, 0}};
+  const recon::DepthLut lut = make_lut({{10, 0.2, 1}, {20, 0.3, 1}}, 0.02, 0.05, profile);
+  EXPECT_EQ(lut.first_q6, -40 * 64);
+  EXPECT_EQ(lut.um.size(), 150U * 64 + 1);
+  EXPECT_EQ(lut.covered_from_q6, -7 * 64);
+  EXPECT_EQ(lut.covered_to_q6, 22 * 64);
+  for (const auto& [level, um] :
+       {std::pair{-7, -100}, {0, 0}, {5, 100}, {15, 250}, {20, 300}, {24, 500}}) {
+    EXPECT_NEAR(um_at(lut, level), um, 1) << level;
+  }
+}
+
+TEST(Lut, IsReadAtTheNearestEntryAndHeldAtItsEnds) {
+  recon::DepthLut lut;
+  lut.first_q6 = -64;
+  for (int q6 = -64; q6 <= 128; ++q6) lut.um.push_back(static_cast<std::int16_t>(2 * q6));
+  EXPECT_DOUBLE_EQ(lut_mm(lut, 0.5), 0.064);
+  EXPECT_DOUBLE_EQ(lut_mm(lut, 0.51), 0.066);
+  EXPECT_DOUBLE_EQ(lut_mm(lut, -1), -0.128);
+  EXPECT_DOUBLE_EQ(lut_mm(lut, -3), -0.128);
+  EXPECT_DOUBLE_EQ(lut_mm(lut, 2), 0.256);
+  EXPECT_DOUBLE_EQ(lut_mm(lut, 9), 0.256);
+}
+
+// The depth grows with the square of the level, a micrometre at one level.
+TEST(Lut, HasTheSlopeOfItsFirstTwentyLevels) {
+  recon::DepthLut lut;
+  for (int q6 = 0; q6 <= 40 * 64; ++q6) {
+    lut.um.push_back(static_cast<std::int16_t>(std::lround(q6 * q6 / 4096.0)));
+  }
+  for (const auto& [covered, mm] : {std::pair{35, 0.020}, {20, 0.020}, {8, 0.008}}) {
+    lut.covered_to_q6 = 64 * covered;
+    EXPECT_NEAR(slope_mm(lut), mm, 1e-9) << covered;
+  }
 }
 
 }  // namespace

@@ -179,6 +179,78 @@ TEST(ParseCalibration, ASurfaceIsCheckedAndMayBeAbsent) {
   refused("[surface]\nshape = \"sphere\"\nradius_mm = 0\n", "surface.radius_mm");
 }
 
+/// The sample under a camera 25 mm above its surface.
+Calibration seen_from(HeightSource source) {
+  Calibration seen = sample();
+  seen.view = {
+      .foot_mm = {0.3, -0.2}, .source = source, .per_mm = 0.04, .per_level = 0, .error = 0.003};
+  return seen;
+}
+
+TEST(ParseCalibration, KnowsWhereTheCameraStands) {
+  for (const HeightSource source :
+       {HeightSource::assumed, HeightSource::board, HeightSource::drawing, HeightSource::presses}) {
+    const Calibration seen = seen_from(source);
+    const Files files = format(seen);
+    const Calibration back = parse(files.toml, files.reference_png, "upload");
+    EXPECT_EQ(back.view, seen.view);
+    EXPECT_EQ(back.model->surface.view, (recon::Viewpoint{{0.3, -0.2}, 0.04}));
+    EXPECT_EQ(format(back).toml, files.toml);
+  }
+  const Files plain = format(sample());
+  const Calibration unknown = parse(plain.toml, plain.reference_png, "upload");
+  EXPECT_EQ(unknown.view, CameraView{});
+  EXPECT_EQ(unknown.model->surface.view, recon::Viewpoint{}) << "depth is placed as it is seen";
+}
+
+TEST(ParseCalibration, BehindACurvedSurfaceThatSaysWhereTheCameraStands) {
+  Calibration curved = seen_from(HeightSource::drawing);
+  auto model = std::make_shared<recon::Model>(*curved.model);
+  model->surface = {recon::Surface::Kind::sphere, 15, 0, 20, 8, 1.41};
+  curved.model = model;
+  const Files files = format(curved);
+  const Calibration back = parse(files.toml, files.reference_png, "upload");
+  EXPECT_EQ(back.view, curved.view);
+  EXPECT_EQ(back.model->surface, model->surface);
+  EXPECT_EQ(back.model->surface.view, recon::Viewpoint{});
+}
+
+TEST(ParseCalibration, TheCamerasPlaceIsChecked) {
+  const Files files = format(seen_from(HeightSource::board));
+  const auto seen_with = [&files](const std::string& from, const std::string& to) {
+    std::string toml = files.toml;
+    const auto table = toml.find("[viewpoint]");
+    toml.replace(toml.find(from, table), from.size(), to);
+    return parse(toml, files.reference_png, "upload").view;
+  };
+  const auto refused = [&](const std::string& from, const std::string& to, const char* key,
+                           const char* what) {
+    EXPECT_THAT([&] { (void)seen_with(from, to); },
+                ThrowsMessage<std::runtime_error>(
+                    AllOf(StartsWith("upload:"), HasSubstr(key), HasSubstr(what))));
+  };
+  EXPECT_EQ(seen_with("per_mm = 0.04", "per_mm = 0.2").per_mm, 0.2);
+  EXPECT_EQ(seen_with("[0.3, -0.2]", "[100, -100]").foot_mm, (recon::Point{100, -100}));
+  refused("per_mm = 0.04", "per_mm = 0.21", "viewpoint.per_mm", "to 0.2");
+  refused("per_mm = 0.04", "per_mm = 0", "viewpoint.per_mm", "above 0");
+  // A board's share for each grey level is not a height until a LUT is made.
+  refused("per_mm = 0.04", "per_level = 0.001", "viewpoint.per_mm", "above 0");
+  refused("[0.3, -0.2]", "[0.3, -100.5]", "viewpoint.foot", "entry 2");
+  refused("[0.3, -0.2]", "[0.3]", "viewpoint.foot", "x and y");
+  refused("\"board\"", "\"unknown\"", "viewpoint.source", "\"presses\"");
+  refused("\"board\"", "\"ruler\"", "viewpoint.source", "\"presses\"");
+  refused("error = 0.003", "error = -0.003", "viewpoint.error", "from 0 to 1");
+}
+
+TEST(ParseCalibration, WidthsAndHeightsHaveLimitsOfTheirOwn) {
+  expect_refused(with("height = 9", "height = 1"), "frame.height", "from 2");
+  expect_refused(with("col = 3", "col = 12"), "crop.col", "from 0 to 11");
+  expect_refused(with("row = 2", "row = 9"), "crop.row", "from 0 to 8");
+  expect_refused(with("width = 6", "width = 10"), "crop.width", "from 1 to 9");
+  expect_refused(with("height = 5", "height = 8"), "crop.height", "from 1 to 7");
+  expect_refused(with("height = 5", "height = 0"), "crop.height", "from 1 to 7");
+}
+
 TEST(ParseCalibration, GainAndUncertaintyAreCheckedAndMayBeAbsent) {
   expect_refused(with("\"radial\"", "\"square\""), "gain.shape", "\"uniform\"");
   expect_refused(with("per_mm = -0.0125", "per_mm = -2"), "gain.per_mm", "from -1 to 1");
@@ -287,6 +359,22 @@ TEST(ParseCalibration, RefusesAnotherFrameThanTheCameras) {
   EXPECT_THAT([&] { (void)read({9, 12}); },
               ThrowsMessage<std::runtime_error>(
                   HasSubstr("frame: is for frames of 12x9 pixels, the camera delivers 9x12: set")));
+}
+
+TEST(FrameSize, GivesFramesOfItsOwnSizeAndOfItsJpegs) {
+  const FrameSize whole{.width = 12, .height = 9};
+  EXPECT_TRUE(whole.gives(12, 9));
+  EXPECT_FALSE(whole.gives(12, 10));
+  EXPECT_FALSE(whole.gives(13, 9));
+  const FrameSize decoded{.width = 4, .height = 3, .decode_scale = 3};
+  EXPECT_TRUE(decoded.gives(4, 3));
+  EXPECT_TRUE(decoded.gives(12, 9));
+  EXPECT_FALSE(decoded.gives(12, 3));
+  EXPECT_FALSE(decoded.gives(4, 9));
+  EXPECT_FALSE(decoded.gives(12, 10));
+  EXPECT_FALSE(decoded.gives(11, 9));
+  EXPECT_EQ(whole.text(), "12x9");
+  EXPECT_EQ(decoded.text(), "4x3 (decoded from 12x9)");
 }
 
 TEST(FormatCalibration, RefusesAnotherRectificationThanTheCrop) {

@@ -138,6 +138,21 @@ TEST(CaptureLoop, SinceWhenALightShowsIsInTheFramesOwnTimestamps) {
   EXPECT_EQ(loop.light->light_since_ns(), loop.frame->light_since_ns);
 }
 
+// Every pixel: the corners alone would not show a row that was copied in part.
+TEST(CaptureLoop, PublishesTheWholePictureWhenItIsWanted) {
+  SteppedLoop loop;
+  loop.exchange.wanted = Wanted{.luma = true};
+  loop.camera.scene = {.tilt = 0.4, .press_mm = 1, .x_px = 120, .y_px = 30};
+  loop.begin(nullptr);
+  ASSERT_TRUE(loop.step());
+  ASSERT_TRUE(loop.frame->has_luma);
+  EXPECT_EQ(loop.frame->luma_width, fakes::kToyWidth);
+  EXPECT_EQ(loop.frame->luma_height, fakes::kToyHeight);
+  std::vector<std::uint8_t> expected(std::size_t{fakes::kToyWidth} * fakes::kToyHeight);
+  fakes::toy_paint(loop.camera.scene, loop.frame->camera.sequence, expected.data());
+  EXPECT_EQ(loop.frame->luma, expected);
+}
+
 TEST(CaptureLoop, PublishesTheCamerasJpegWhenItIsWanted) {
   SteppedLoop loop;
   loop.exchange.wanted = Wanted{};

@@ -173,6 +173,23 @@ TEST(CaptureLoop, AGoodCalibrationTakesThePlaceOfAnUnusableOne) {
   EXPECT_FALSE(loop.health().has(Health::camera_mismatch));
 }
 
+// Depth is measured all the same: the lens may be as it was.
+TEST(CaptureLoop, ACalibrationOfAnotherCameraIsReportedAsLongAsItIsInUse) {
+  SteppedLoop loop;
+  loop.begin(toy_calibration());
+  ASSERT_TRUE(loop.until_fresh());
+  const auto other = toy_calibration();
+  other->origin.camera = "another";
+  ASSERT_TRUE(loop.use(other));
+  loop.step(2);
+  EXPECT_TRUE(loop.health().has(Health::camera_mismatch));
+  EXPECT_TRUE(loop.frame->health.has(Health::camera_mismatch));
+  EXPECT_TRUE(loop.frame->has_depth);
+  ASSERT_TRUE(loop.use(toy_calibration()));
+  loop.step(2);
+  EXPECT_FALSE(loop.health().has(Health::camera_mismatch));
+}
+
 TEST(CaptureLoop, ACalibrationOutOfUseIsHeldByNobody) {
   SteppedLoop loop;
   const auto first = toy_calibration();

@@ -173,6 +173,24 @@ TEST(Histogram, LargeValuesAreWithinAThirtySecond) {
   EXPECT_EQ(histogram.max_ns(), 16'000'000);
 }
 
+// The upper six bits name a bucket: from 64 on it is two wide, from 128 on four.
+TEST(Histogram, APercentileIsTheLastValueOfItsBucket) {
+  const auto median_of = [](std::int64_t ns) {
+    Histogram histogram;
+    histogram.add(ns);
+    histogram.add(ns);
+    histogram.add(INT64_MAX);
+    return histogram.percentile_ns(0.5);
+  };
+  EXPECT_EQ(median_of(63), 63);
+  EXPECT_EQ(median_of(64), 65);
+  EXPECT_EQ(median_of(65), 65);
+  EXPECT_EQ(median_of(66), 67);
+  EXPECT_EQ(median_of(127), 127);
+  EXPECT_EQ(median_of(128), 131);
+  EXPECT_EQ(median_of(1'000'000), 1'015'807);  // 62 · 2¹⁴ − 1
+}
+
 TEST(Histogram, TakesTheExtremes) {
   Histogram histogram;
   histogram.add(-5);

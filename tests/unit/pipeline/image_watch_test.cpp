@@ -101,6 +101,28 @@ TEST_F(ImageWatchTest, LightIsLookedAtEverySixteenFrames) {
   EXPECT_TRUE(has(Health::light_drifted));
 }
 
+TEST_F(ImageWatchTest, LightIsComparedFromAQuarterOfTheCellsOn) {
+  pixels_.assign(pixels_.size(), 90);
+  report_.active_cells = 19;  // of 80
+  look();
+  EXPECT_FALSE(has(Health::light_drifted));
+  report_.active_cells = 20;
+  look();
+  EXPECT_TRUE(has(Health::light_drifted));
+}
+
+TEST_F(ImageWatchTest, AQuarterMoreActiveCellsAreLookedAtAtOnce) {
+  report_.active_cells = 20;
+  look();
+  pixels_.assign(pixels_.size(), 90);
+  report_.active_cells = 39;
+  look();
+  EXPECT_FALSE(has(Health::light_drifted));
+  report_.active_cells = 40;
+  look();
+  EXPECT_TRUE(has(Health::light_drifted));
+}
+
 TEST_F(ImageWatchTest, LightThatChangesUnderAPressIsLookedAtAtOnce) {
   report_.active_cells = 30;
   look();
@@ -129,6 +151,15 @@ TEST_F(ImageWatchTest, BandsAreOverSevenFramesAfterTheLast) {
   EXPECT_TRUE(has(Health::light_banded));
   look();
   EXPECT_FALSE(has(Health::light_banded));
+}
+
+TEST_F(ImageWatchTest, RipplesUpToHalfALevelAreNoBands) {
+  report_.frame.ripple = 0.5;
+  for (int i = 0; i < 12; ++i) look();
+  EXPECT_FALSE(has(Health::light_banded));
+  report_.frame.ripple = 0.51;
+  for (int i = 0; i < 6; ++i) look();
+  EXPECT_TRUE(has(Health::light_banded));
 }
 
 TEST_F(ImageWatchTest, FineBandsCountAsBands) {

@@ -378,6 +378,45 @@ TEST_F(KeeperTest, ANewCalibrationKeepsAFreshReference) {
   EXPECT_TRUE(keeper.ready());
 }
 
+// The first timeout_frames frames are waited for; what is not still then counts as in contact.
+TEST_F(KeeperTest, ARezeroOfAMovingImageIsRefusedOnceTheTimeIsOver) {
+  calibrate();
+  ASSERT_TRUE(run(40));
+  EXPECT_EQ(keeper.rezero(false, false), std::nullopt);
+  for (int i = 0; i < 100; ++i) {
+    scene.light = i % 2 == 0 ? 1 : 0.95;
+    ASSERT_FALSE(run(1)) << i;
+  }
+  ASSERT_TRUE(run(1));
+  EXPECT_EQ(last.answer, Outcome::refused_unsteady);
+  EXPECT_FALSE(last.reference_changed);
+}
+
+TEST_F(KeeperTest, AMovingImageAtStartIsWaitedForTwice) {
+  calibrate();
+  const auto flicker = [this](int frames) {
+    for (int i = 0; i < frames; ++i) {
+      scene.light = i % 2 == 0 ? 0.95 : 1;
+      if (run(1)) return true;
+    }
+    return false;
+  };
+  EXPECT_FALSE(flicker(100));
+  EXPECT_EQ(keeper.state(), State::settling);
+  EXPECT_FALSE(flicker(1));
+  EXPECT_EQ(keeper.state(), State::referencing);
+  EXPECT_FALSE(flicker(100));
+  EXPECT_EQ(keeper.state(), State::referencing);
+  EXPECT_TRUE(flicker(1));
+  EXPECT_EQ(keeper.quality(), ReferenceQuality::stale);
+}
+
+TEST_F(KeeperTest, FramesHave80By60PixelsAtLeast) {
+  EXPECT_NO_THROW(ReferenceKeeper(80, 60, rules()));
+  EXPECT_THROW(ReferenceKeeper(80, 59, rules()), std::invalid_argument);
+  EXPECT_THROW(ReferenceKeeper(79, 60, rules()), std::invalid_argument);
+}
+
 TEST_F(KeeperTest, RefusesWhatCannotWork) {
   EXPECT_THROW(ReferenceKeeper(79, 60, rules()), std::invalid_argument);
   EXPECT_THROW(keeper.restore(std::vector<std::uint16_t>(5), true, true), std::invalid_argument);

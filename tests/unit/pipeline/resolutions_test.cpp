@@ -148,6 +148,19 @@ TEST(Resolutions, CountTheLightOfTheMapAlone) {
   EXPECT_NEAR(maps.contact_um(1, 0, {.light_left = 0.01}), 0.01 * 100 * 32, 0.01);
 }
 
+TEST(Resolutions, HaveTheUncertaintyOfTheirOwnLut) {
+  const auto toy = fakes::scattering_toy_calibration(15);
+  recon::Model model = *toy->model;
+  model.uncertainty = {{.depth_mm = 0.5, .error_um = 31}};
+  model.sharpened[1].uncertainty = {{.depth_mm = 0.5, .error_um = 9}};
+  const CalibratedImage image(toy);
+  const Resolutions maps(std::make_shared<const recon::Model>(std::move(model)),
+                         image.cells.lattice(), {.decimation = 1});
+  EXPECT_EQ(maps.lut_um(0.5, 0), 31);
+  EXPECT_EQ(maps.lut_um(0.5, 1), 15);
+  EXPECT_EQ(maps.lut_um(0.5, 2), 9);
+}
+
 TEST(Resolutions, RefuseStepsThatTheFilterCannotTake) {
   EXPECT_THAT([] { (void)resolutions(too_wide(), 1, 2); },
               testing::ThrowsMessage<std::invalid_argument>(

@@ -111,6 +111,19 @@ TEST(LutUncertainty, IsTheCalibrationsBetweenItsRows) {
                    40);
 }
 
+TEST(LutUncertainty, HoldsBeyondBothEndsOfItsRows) {
+  EXPECT_DOUBLE_EQ(lut_um([](recon::Model& m) {
+                     m.uncertainty = {{.depth_mm = 0.6, .error_um = 30},
+                                      {.depth_mm = 0.8, .error_um = 70}};
+                   }),
+                   30);
+  EXPECT_DOUBLE_EQ(lut_um([](recon::Model& m) {
+                     m.uncertainty = {{.depth_mm = 0.2, .error_um = 30},
+                                      {.depth_mm = 0.4, .error_um = 70}};
+                   }),
+                   70);
+}
+
 TEST(LutUncertainty, OfACalibrationThatDoesNotSayIsWhatTheTableMeasured) {
   EXPECT_EQ(lut_um([](recon::Model&) {}), 50);
   EXPECT_EQ(lut_um([](recon::Model& m) { m.method = recon::Method::published; }), 118);

@@ -3,7 +3,9 @@
 #include <sys/mman.h>
 #include <unistd.h>
 
+#include <memory>
 #include <stdexcept>
+#include <utility>
 
 #include "daemon/pipeline/active_calibration.hpp"
 #include "daemon/pipeline/camera_watch.hpp"
@@ -157,6 +159,26 @@ TEST(RateWatch, ATenthLessIsReportedAndAClocksErrorIsNot) {
   EXPECT_TRUE(watch.slow());
 }
 
+// Intervals are gathered for a second, but no more than 256 and no fewer than five.
+TEST(RateWatch, KnowsAFastCamerasRateAfter256Intervals) {
+  RateWatch watch(kMs);
+  hal::FrameInfo info;
+  add_frames(watch, info, 256, kMs);
+  EXPECT_EQ(watch.fps(), 0);  // 255 intervals
+  add_frames(watch, info, 1, kMs);
+  EXPECT_DOUBLE_EQ(watch.fps(), 1000);
+}
+
+TEST(RateWatch, KnowsASlowCamerasRateAfterFiveIntervals) {
+  RateWatch watch(2000 * kMs);
+  hal::FrameInfo info;
+  add_frames(watch, info, 5, 2000 * kMs);
+  EXPECT_EQ(watch.fps(), 0);  // four intervals
+  add_frames(watch, info, 1, 2000 * kMs);
+  EXPECT_DOUBLE_EQ(watch.fps(), 0.5);
+  EXPECT_FALSE(watch.slow());
+}
+
 TEST(RateWatch, BeginsAnewWithACameraOpenedAnew) {
   CameraWatch watch(kPeriod);
   std::int64_t at_ns = 0;
@@ -190,6 +212,27 @@ TEST(SkipWatch, NamesAMachineThatLeavesOutMoreThanAFifth) {
   EXPECT_TRUE(watch.behind());
   add(400, 1);
   EXPECT_FALSE(watch.behind());
+}
+
+TEST(SkipWatch, AFifthIsAllowed) {
+  SkipWatch watch;
+  hal::FrameInfo info;
+  const auto add = [&](int frames, std::uint64_t step) {
+    for (int i = 0; i < frames; ++i) {
+      info.sequence += step;
+      info.timestamp_ns += static_cast<std::int64_t>(step) * kPeriod;
+      watch.add(info);
+    }
+  };
+  add(1, 1);
+  add(120, 1);
+  add(40, 2);  // 40 of 200, in two seconds
+  EXPECT_FALSE(watch.behind());
+  add(118, 1);
+  add(40, 2);
+  EXPECT_FALSE(watch.behind()) << "the two seconds are not over";
+  add(1, 2);  // 41 of 200
+  EXPECT_TRUE(watch.behind());
 }
 
 TEST(SkipWatch, WhatTheCameraLostIsNotSkipped) {
@@ -364,6 +407,30 @@ TEST(Activate, TakesACalibrationForTheJpegsOrForTheDecodedFrames) {
   EXPECT_THAT([&] { (void)activate(toy, camera, {}); },
               testing::ThrowsMessage<std::invalid_argument>(
                   testing::HasSubstr("the camera delivers 80x60 (decoded from 320x240)")));
+}
+
+// The frame is 40 by 30 cells of four pixels; eight cells each way are needed.
+TEST(Activate, RefusesAPartOfFewerThanEightCellsEachWay) {
+  hal::CameraInfo camera;
+  camera.width = fakes::kToyWidth;
+  camera.height = fakes::kToyHeight;
+  const auto use = [&camera](int width, int height) {
+    auto toy = fakes::toy_calibration();
+    recon::Model model = *toy->model;
+    model.rectify =
+        recon::make_crop_table(fakes::kToyWidth, fakes::kToyHeight, 8, 12, width, height);
+    toy->model = std::make_shared<const recon::Model>(std::move(model));
+    return activate(toy, camera, {})->image.region;
+  };
+  EXPECT_EQ(use(32, 100), (CellRegion{.x0 = 2, .y0 = 3, .x1 = 10, .y1 = 28}));
+  EXPECT_EQ(use(140, 32), (CellRegion{.x0 = 2, .y0 = 3, .x1 = 37, .y1 = 11}));
+  const auto refused = [&use](int width, int height, const char* size) {
+    EXPECT_THAT([&] { (void)use(width, height); },
+                testing::ThrowsMessage<std::invalid_argument>(
+                    testing::AllOf(testing::HasSubstr("\"toy\""), testing::HasSubstr(size))));
+  };
+  refused(28, 100, "covers 28x100 pixels");
+  refused(140, 28, "covers 140x28 pixels");
 }
 
 TEST(Activate, KnowsTheCellsOfTheCalibratedPart) {

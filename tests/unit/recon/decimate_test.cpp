@@ -90,6 +90,62 @@ TEST(ScaledFrames, KeepMillimetresSmoothingAndMarks) {
   EXPECT_EQ(decimate(half, 2).rectify.width, 4);
 }
 
+// Each pixel of the reference differs: 10 more a column, 100 more a row.
+TEST(ScaledFrames, AverageTheReferenceRoundedHalfUp) {
+  Model model = straight_model();
+  for (std::size_t i = 0; i < model.reference_q8.size(); ++i) {
+    model.reference_q8[i] = static_cast<std::uint16_t>(1000 + 10 * (i % 24) + 100 * (i / 24));
+  }
+  model.reference_q8[24 * 7 + 11] += 2;  // half a unit of its mean of four
+  model.reference_q8[24 * 7 + 13] += 1;  // a quarter
+  const Model half = for_scaled_frames(model, 2);
+  ASSERT_EQ(half.reference_q8.size(), std::size_t{12} * 10);
+  EXPECT_EQ(half.reference_q8[0], 1055);           // 1000 + 10/2 + 100/2
+  EXPECT_EQ(half.reference_q8[11], 1275);          // 220 more, 11 columns on
+  EXPECT_EQ(half.reference_q8[12 * 9], 2855);      // 1800 more, 9 rows down
+  EXPECT_EQ(half.reference_q8[12 * 3 + 5], 1756);  // 1055 + 5 · 20 + 3 · 200 + 1/2
+  EXPECT_EQ(half.reference_q8[12 * 3 + 6], 1775);  // 1055 + 6 · 20 + 3 · 200 + 1/4
+  const Model quarter = for_scaled_frames(model, 4);
+  ASSERT_EQ(quarter.reference_q8.size(), std::size_t{6} * 5);
+  EXPECT_EQ(quarter.reference_q8[6 * 4 + 5], 2965);  // 1000 + 10 · 21.5 + 100 · 17.5
+}
+
+// The middle of a scaled pixel is the middle of the pixels that it is the mean of.
+TEST(ScaledFrames, AreReadAtTheMiddleOfEachArea) {
+  const RectifyTable half = for_scaled_frames(straight_model(), 2).rectify;
+  const auto expect_place = [](const RectifyTable::Entry& at, int x, int fx, int y, int fy) {
+    EXPECT_EQ(at.x, x);
+    EXPECT_EQ(at.fx, fx);
+    EXPECT_EQ(at.y, y);
+    EXPECT_EQ(at.fy, fy);
+  };
+  // Columns 2 and 3, rows 3 and 4: the scaled frame's column 1 and row 1.5.
+  expect_place(half.entries.front(), 1, 0, 1, 64);
+  // Columns 16 and 17, rows 13 and 14.
+  expect_place(half.entries.back(), 8, 0, 6, 64);
+  expect_place(half.entries[8 * 2 + 3], 4, 0, 3, 64);
+  // The frame's last column is reached from the one before with the full weight, the last row, too.
+  Model corner = straight_model();
+  corner.rectify = make_crop_table(24, 20, 8, 8, 16, 12);
+  expect_place(for_scaled_frames(corner, 2).rectify.entries.back(), 10, 128, 8, 128);
+}
+
+TEST(ScaledFrames, HaveTwoPixelsAtLeast) {
+  Model model = straight_model();
+  const auto resize = [&model](int width, int height) {
+    model.rectify = make_crop_table(width, height, 0, 0, 4, 4);
+    model.reference_q8.assign(static_cast<std::size_t>(width * height), 150 * 256);
+  };
+  resize(8, 12);
+  EXPECT_EQ(for_scaled_frames(model, 4).rectify.frame_width, 2);
+  resize(12, 8);
+  EXPECT_EQ(for_scaled_frames(model, 4).rectify.frame_height, 2);
+  resize(4, 12);
+  EXPECT_THROW((void)for_scaled_frames(model, 4), std::invalid_argument);
+  resize(12, 4);
+  EXPECT_THROW((void)for_scaled_frames(model, 4), std::invalid_argument);
+}
+
 TEST(ScaledFrames, AreMultiplesOfTheScale) {
   Model model = straight_model();
   EXPECT_THROW((void)for_scaled_frames(model, 3), std::invalid_argument);
@@ -157,6 +213,34 @@ TEST(Decimate, AnUntrustedPixelMarksItsArea) {
       EXPECT_EQ(half[i], i == 2 * 8 + 3 ? kUntrusted : 0) << pixel << " " << i;
     }
   }
+}
+
+TEST(Decimate, AMarkOfWhatFillsNoPixelIsDropped) {
+  Model model = straight_model();
+  model.rectify = make_crop_table(24, 20, 2, 3, 15, 11);
+  // Columns 1 to 12 and rows 1 to 8 make three pixels by two.
+  const auto marked = [&model](std::size_t x, std::size_t y) {
+    model.untrusted.assign(std::size_t{15} * 11, 0);
+    model.untrusted[15 * y + x] = 1;
+    return decimate(model, 4).untrusted;
+  };
+  EXPECT_EQ(marked(0, 1), (std::vector<std::uint8_t>{0, 0, 0, 0, 0, 0}));
+  EXPECT_EQ(marked(1, 0), (std::vector<std::uint8_t>{0, 0, 0, 0, 0, 0}));
+  EXPECT_EQ(marked(1, 1), (std::vector<std::uint8_t>{1, 0, 0, 0, 0, 0}));
+  EXPECT_EQ(marked(5, 4), (std::vector<std::uint8_t>{0, 1, 0, 0, 0, 0}));
+  EXPECT_EQ(marked(12, 8), (std::vector<std::uint8_t>{0, 0, 0, 0, 0, 1}));
+  EXPECT_EQ(marked(13, 8), (std::vector<std::uint8_t>{0, 0, 0, 0, 0, 0}));
+  EXPECT_EQ(marked(12, 9), (std::vector<std::uint8_t>{0, 0, 0, 0, 0, 0}));
+}
+
+TEST(Decimate, OnePixelIsEnough) {
+  Model model = straight_model();
+  model.rectify = make_crop_table(24, 20, 2, 3, 4, 7);
+  EXPECT_EQ(decimate(model, 4).rectify.width, 1);
+  model.rectify = make_crop_table(24, 20, 2, 3, 7, 4);
+  EXPECT_EQ(decimate(model, 4).rectify.height, 1);
+  model.rectify = make_crop_table(24, 20, 2, 3, 3, 7);
+  EXPECT_THROW((void)decimate(model, 4), std::invalid_argument);
 }
 
 TEST(Decimate, RefusesWhatItCannotDo) {

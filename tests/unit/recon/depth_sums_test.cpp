@@ -94,6 +94,20 @@ TEST(BendRow, NoPixelAddsMoreThan32Millimetres) {
   EXPECT_EQ(std::tuple(sums.bent, sums.bend_um), std::tuple(1, 32767));
 }
 
+// A caller that names no threshold sums, counts and bends at every pixel deeper than nothing.
+TEST(SumRules, AreZeroWhereNothingIsStated) {
+  const std::vector<std::int16_t> map{0, 0, 0,  //
+                                      0, 1, 0,  //
+                                      0, 0, 0};
+  DepthSums sums({.bend_reach = 1});
+  kernels::sum_row(map.data() + 3, 1, 0, 3, sums);
+  kernels::bend_row(map.data() + 3, 3, 1, 2, sums);
+  EXPECT_EQ(std::tuple(sums.made, sums.lost, sums.um), std::tuple(1, 1, 1));
+  EXPECT_EQ(std::tuple(sums.um_x, sums.um_y), std::tuple(1, 1));
+  EXPECT_EQ(std::tuple(sums.bent, sums.bend_um), std::tuple(1, 4));
+  EXPECT_EQ(SumRules{}.bend_reach, 0) << "no bend unless it is asked for";
+}
+
 class VectorSums : public EveryTarget {
  protected:
   int uniform(int low, int high) {

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -213,6 +214,42 @@ TEST(CellMap, AContactIsCutOffByEachEdgeOfAnyMap) {
   EXPECT_TRUE(cut_off(kColumns - 10, kRows - 10, 10, 10)) << "corner";
   EXPECT_FALSE(cut_off(160, 160, 64, 64));
   EXPECT_FALSE(cut_off(kColumns - 2, 160, 2, 8)) << "noise";
+}
+
+// 480 × 400 pixels are 30 × 25 cells and nothing beside them.
+TEST(CellMap, AContactInTheLastCellsIsCutOff) {
+  const auto cut_off = [](int x, int y, int width, int height) {
+    std::vector<std::int16_t> map(std::size_t{480} * kHeight);
+    for (int row = y; row < y + height; ++row) {
+      std::fill_n(map.begin() + row * 480 + x, width, std::int16_t{300});
+    }
+    CellMap cells(480, kHeight, kMmPerPx);
+    cells.read(map);
+    return cells.cut_off();
+  };
+  EXPECT_TRUE(cut_off(464, 160, 16, 64)) << "right";
+  EXPECT_FALSE(cut_off(448, 160, 16, 64)) << "one cell before it";
+  EXPECT_TRUE(cut_off(160, 384, 64, 16)) << "bottom";
+  EXPECT_FALSE(cut_off(160, 368, 64, 16)) << "one cell before it";
+  EXPECT_TRUE(cut_off(0, 160, 16, 64)) << "left";
+  EXPECT_FALSE(cut_off(16, 160, 16, 64)) << "one cell before it";
+  EXPECT_TRUE(cut_off(160, 0, 64, 16)) << "top";
+  EXPECT_FALSE(cut_off(160, 16, 64, 16)) << "one cell before it";
+}
+
+TEST_F(ForceTest, IsNotKnownBesideWhatIsUntrustedOnAnySide) {
+  const auto absence_beside = [this](int x, int y, int width, int height) {
+    fill(0, 0, kWidth, kHeight, 0);
+    fill(160, 160, 64, 48, 500);
+    fill(x, y, width, height, kUntrusted);
+    return read().absence;
+  };
+  EXPECT_EQ(absence_beside(144, 160, 16, 16), ForceAbsence::cut_off) << "left";
+  EXPECT_EQ(absence_beside(224, 192, 16, 16), ForceAbsence::cut_off) << "right";
+  EXPECT_EQ(absence_beside(160, 144, 16, 16), ForceAbsence::cut_off) << "above";
+  EXPECT_EQ(absence_beside(208, 208, 16, 16), ForceAbsence::cut_off) << "below";
+  EXPECT_EQ(absence_beside(144, 144, 16, 16), ForceAbsence::none) << "a corner is no neighbour";
+  EXPECT_EQ(absence_beside(128, 160, 16, 48), ForceAbsence::none) << "a cell between them";
 }
 
 TEST_F(ForceTest, LooksWhereTheMapIsNotZeroAlone) {

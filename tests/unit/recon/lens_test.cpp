@@ -62,6 +62,32 @@ TEST(Lens, APointIsSeenByThePixelThatShowsIt) {
   EXPECT_NEAR(map_pixel(sample(), place, {mm.x + 0.04, mm.y}).x, 12.5, 1e-9);
 }
 
+// A mistake that surface_point() and map_pixel() share does not show when one undoes the other.
+TEST(Lens, AMapsPixelLiesItsColumnsAndRowsFromTheOrigin) {
+  const MapPlace place{7, -3, 40, 30, 0.04};
+  const Point mm = surface_point(sample(), place, 11.5, 2.25);
+  EXPECT_NEAR(mm.x, 0.54, 1e-12);   // (7 + 11.5 − 5) · 0.04
+  EXPECT_NEAR(mm.y, -0.19, 1e-12);  // (−3 + 2.25 − 4) · 0.04
+  EXPECT_NEAR(map_pixel(sample(), place, {0.54, -0.11}).y, 4.25, 1e-9);
+}
+
+TEST(Lens, TheAxisFootIsSeenAtTheCentreOfDistortion) {
+  Lens lens = sample();
+  lens.homography = {20, 10, 5, -10, 20, 4, 0, 0, 1};
+  // (2, −1) mm: 40 − 10 + 5 and −20 − 20 + 4.
+  lens.centre_col = 35;
+  lens.centre_row = -36;
+  EXPECT_NEAR(axis_foot(lens).x, 2, 1e-12);
+  EXPECT_NEAR(axis_foot(lens).y, -1, 1e-12);
+  // The same point under perspective: divided by 1 + 0.2 − 0.05.
+  lens.homography[6] = 0.1;
+  lens.homography[7] = 0.05;
+  lens.centre_col = 35 / 1.15;
+  lens.centre_row = -36 / 1.15;
+  EXPECT_NEAR(axis_foot(lens).x, 2, 1e-12);
+  EXPECT_NEAR(axis_foot(lens).y, -1, 1e-12);
+}
+
 TEST(Lens, TableHoldsPlaceAndWeights) {
   // A map of 0.1 mm a pixel reads every second pixel of the frame; the origin stays at (5, 4).
   std::vector<std::uint8_t> outside;
