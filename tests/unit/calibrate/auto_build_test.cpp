@@ -8,6 +8,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "clients/calibrate/fit/model/model_build.hpp"
 #include "tests/unit/calibrate/predicted_press.hpp"
 
 namespace dtact::calibration {
@@ -68,6 +69,28 @@ TEST(AutoBuild, ConstrainsTheLutToAGelThatIsTheSameInAllParts) {
   EXPECT_TRUE(made.gel);
   PressReport ignored;
   EXPECT_NE(made.model->lut.um, build_from_sphere(set, {}, ignored).model->lut.um);
+}
+
+// In squares: how sure the gel's LUT is, and how far the press's own shape is from it.
+TEST(AutoBuild, AConstrainedLutIsAsUncertainAsTheGelAndItsDistanceFromIt) {
+  const BallPresses set = press_of({});
+  PressReport report;
+  const recon::Model made = *build_auto(set, {}, report).model;
+  const recon::Model gel = *build_model(set, {}).calibration.model;
+  ASSERT_EQ(made.uncertainty.size(), gel.uncertainty.size());
+  ASSERT_GE(made.uncertainty.size(), 5U);
+  double farthest_um = 0;
+  for (std::size_t i = 0; i < gel.uncertainty.size(); ++i) {
+    const double depth_mm = gel.uncertainty[i].depth_mm;
+    EXPECT_EQ(made.uncertainty[i].depth_mm, depth_mm);
+    double level = -40;
+    while (lut_mm(made.lut, level) < depth_mm && level < 110) level += 1.0 / 64;
+    const double apart_um = 1000 * (lut_mm(made.lut, level) - lut_mm(gel.lut, level));
+    farthest_um = std::max(farthest_um, std::abs(apart_um));
+    EXPECT_NEAR(made.uncertainty[i].error_um, std::hypot(gel.uncertainty[i].error_um, apart_um), 2)
+        << depth_mm;
+  }
+  EXPECT_GT(farthest_um, 10);
 }
 
 TEST(AutoBuild, BelievesNoDepthThatChangesWithThePartLookedAt) {

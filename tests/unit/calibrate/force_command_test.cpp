@@ -204,6 +204,21 @@ TEST_F(ForceOfARecording, TakesWhatTheDaemonMeasured) {
               ThrowsMessage<std::runtime_error>(HasSubstr("press.mcap:120:180")));
 }
 
+// The end is behind the last frame, so a range of one frame has an end that is one more.
+TEST_F(ForceOfARecording, TakesARangeOfAtLeastOneFrame) {
+  const calibration::Calibration cal = calibration::load(at("cal"));
+  const ContactReader reader(cal, cal.model->reference_q8, at("cal"));
+  const std::string file = recording("cal");
+  EXPECT_FLOAT_EQ(std::ranges::max(reader.measure(file + ":9:10").contact.mm()), 0.6F);
+  EXPECT_FLOAT_EQ(std::ranges::max(reader.measure(file + ":13:15").contact.mm()), 1.05F);
+  EXPECT_EQ(reader.measure(file + ":9:10").name, file + ":9:10");
+  for (const char* range : {":9:9", ":9:8", ":9:", ":", "::9", ":9:x", ":9:10:11", ":-1"}) {
+    EXPECT_THAT([&] { (void)reader.measure(file + range); },
+                ThrowsMessage<std::runtime_error>(HasSubstr("press.mcap:120:180")))
+        << range;
+  }
+}
+
 TEST_F(ForceOfARecording, RefusesThatOfAnotherCalibration) {
   const std::string file = recording("cal");
   ASSERT_EQ(run({"depth", "--reference", at("reference.png"), "--ball", at("ball.png"),

@@ -121,5 +121,23 @@ TEST(FitForce, RefusesWhatCannotBeRight) {
   expect_refused(kilograms, "newtons", "1 kg weighs 9.81 N");
 }
 
+// Exact readings of a gel with this modulus, whose depth has its zero in place.
+std::vector<Pair> pairs_of_modulus(double modulus_mpa) {
+  std::vector<Pair> made = pairs();
+  for (Pair& pair : made) {
+    pair.newtons = modulus_mpa * recon::GelResponse(2.3, pair.contact).answer(pair.contact).mm2;
+  }
+  return made;
+}
+
+TEST(FitForce, TheModuliOfSiliconesAreAllowed) {
+  for (const double modulus_mpa : {0.0201, 1.99}) {
+    EXPECT_NEAR(fit_force(pairs_of_modulus(modulus_mpa), 2.3).model.modulus_mpa, modulus_mpa,
+                1e-3 * modulus_mpa);
+  }
+  expect_refused(pairs_of_modulus(0.0199), "0.0199 MPa", "1 kg weighs 9.81 N");
+  expect_refused(pairs_of_modulus(2.01), "2.01 MPa", "--grams takes grams");
+}
+
 }  // namespace
 }  // namespace dtact::force

@@ -8,6 +8,9 @@
 #include <filesystem>
 #include <sstream>
 #include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "clients/calibrate/guided/cells.hpp"
 #include "clients/calibrate/guided/console.hpp"
@@ -61,6 +64,25 @@ TEST(Cells, MeansOverThePartOfTheFrame) {
   EXPECT_EQ(cells[1], 10);
   EXPECT_EQ(CellGrid({0, 0, 1200, 960}).cell_px(), 20);
   EXPECT_THROW(CellGrid({0, 0, 200, 95}), std::invalid_argument);
+}
+
+// Of 8 and 16 bits; each pixel of the cell in the eighth column and the fourth row counts.
+TEST(Cells, AreInRowsOfTheirColumns) {
+  std::vector<std::uint8_t> luma(std::size_t{130} * 110, 10);
+  std::vector<std::uint16_t> luma_q8(luma.size(), 10 * 256);
+  for (const auto& [x, y] : {std::pair{84, 36}, {95, 47}}) {  // its first and its last pixel
+    const auto at = static_cast<std::size_t>(130 * (y + 2) + x + 4);
+    luma[at] = 10 + 144;
+    luma_q8[at] = 256 * 10 + 128 * 144;
+  }
+  const CellGrid grid({4, 2, 120, 100});
+  const CellMeans whole = grid.of(luma, 130);
+  const CellMeans half = grid.of(luma_q8, 130);
+  ASSERT_THAT(half, SizeIs(10 * 8));
+  for (std::size_t i = 0; i < whole.size(); ++i) {
+    EXPECT_EQ(whole[i], i == 3 * 10 + 7 ? 12 : 10) << i;
+    EXPECT_EQ(half[i], i == 3 * 10 + 7 ? 11 : 10) << i;
+  }
 }
 
 TEST(Cells, ADimmedLightIsNoContact) {
@@ -260,6 +282,33 @@ TEST_F(Piped, ReportsAnotherProgramInJson) {
   EXPECT_EQ(reported.scene().presses_required(), 6U);
   type("q\n");
   EXPECT_EQ(console.typed().line, "q");
+}
+
+TEST_F(Piped, ReportsAWholeSceneInJson) {
+  JsonConsole console(ends_[0], out_, [] { return false; });
+  Scene scene;
+  scene.mm_per_px = 0.0417;
+  scene.words = "contact 5.1 mm wide";
+  scene.prompt = {"Press", {{"r", "retake press-02"}}};
+  scene.presses = {{"press-01", 3, 4, 5, 1.25}, {"press-02", 13.5, 24.25, 15, 0.75}};
+  scene.covered_mm = 1.375;
+  console.live(scene);
+  cli::GuidedLine reported;
+  ASSERT_TRUE(google::protobuf::util::JsonStringToMessage(out_.str(), &reported).ok());
+  const cli::GuidedScene& shown = reported.scene();
+  EXPECT_EQ(shown.picture_png(), "") << "unchanged";
+  EXPECT_EQ(shown.mm_per_px(), 0.0417);
+  EXPECT_EQ(shown.words(), "contact 5.1 mm wide");
+  ASSERT_EQ(shown.answers_size(), 1);
+  EXPECT_EQ(shown.answers(0).key(), "r");
+  EXPECT_EQ(shown.answers(0).words(), "retake press-02");
+  ASSERT_EQ(shown.presses_size(), 2);
+  EXPECT_EQ(shown.presses(1).name(), "press-02");
+  EXPECT_EQ(shown.presses(1).col(), 13.5);
+  EXPECT_EQ(shown.presses(1).row(), 24.25);
+  EXPECT_EQ(shown.presses(1).radius_px(), 15);
+  EXPECT_EQ(shown.presses(1).depth_mm(), 0.75);
+  EXPECT_EQ(shown.covered_mm(), 1.375);
 }
 
 TEST_F(Piped, LiveLinesAreForPeople) {

@@ -2,8 +2,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cstdio>
 #include <cstdlib>
+#include <functional>
 #include <map>
+#include <string>
+#include <vector>
 
 #include "clients/calibrate/guided/capture.hpp"
 #include "clients/calibrate/guided/session.hpp"
@@ -497,6 +501,88 @@ TEST_F(GuidedSession, DrawsForAPerson) {
   EXPECT_TRUE(console.drew);
   EXPECT_THAT(text_of(console.drawn.prompt), HasSubstr("[q] end the session"));
   EXPECT_EQ(console.drawn.presses_required, plan_.presses);
+}
+
+/// Calls `on_line` before the session reads a line.
+class WatchedConsole : public FakeConsole {
+ public:
+  using FakeConsole::FakeConsole;
+  [[nodiscard]] Typed typed() override {
+    Typed typed = FakeConsole::typed();
+    if (typed.kind == Typed::Kind::line && on_line) on_line(typed.line);
+    return typed;
+  }
+  std::function<void(const std::string& line)> on_line;
+};
+
+// As long as there is no press, nothing depends on the light of the reference before.
+TEST_F(GuidedSession, AReferenceWithoutPressesIsRetakenUnderAnotherLight) {
+  FakeSensor sensor({kContactFree});
+  WatchedConsole console({"", "r", "", "q"});
+  console.on_line = [&](const std::string& line) {
+    if (line == "r") sensor.now.mutable_light()->set_brightness(128);
+  };
+  EXPECT_EQ(run(sensor, console), Outcome::unfinished) << console.said;
+  EXPECT_THAT(console.said, HasSubstr("[r] retake reference"));
+  const std::string taken = "reference taken: 8 frames";
+  EXPECT_NE(console.said.find(taken), console.said.rfind(taken)) << console.said;
+  EXPECT_EQ(recorded_origin({(plan_.folder / "reference").string()}).leds,
+            std::vector<std::uint8_t>(24, 128));
+}
+
+// There was contact at the first reference, and the light changes before the second.
+TEST_F(GuidedSession, AReferenceThatIsRetakenIsOfTheSameLight) {
+  FakeSensor sensor({{.depth_mm = 0.4, .x_px = 130, .y_px = 110, .frames = 40},
+                     {.depth_mm = 1.3, .x_px = 190, .y_px = 180},
+                     kContactFree});
+  WatchedConsole console({"", "", "", ""});
+  console.on_line = [&](const std::string&) {
+    if (console.said.find("has to be taken again") != std::string::npos)
+      sensor.now.mutable_light()->set_brightness(128);
+  };
+  EXPECT_THAT([&] { (void)run(sensor, console); },
+              ThrowsMessage<std::runtime_error>(
+                  HasSubstr("the light is another than when the reference was taken")));
+  EXPECT_EQ(recorded_origin({(plan_.folder / "reference").string()}).leds,
+            std::vector<std::uint8_t>(24, 255));
+}
+
+// 0.1 mm deep, where 3 grey levels end the contact, a ball 1.3 mm deep is 2.86 mm in radius.
+TEST_F(GuidedSession, ShowsThePressesAndWhatTheyCover) {
+  FakeSensor sensor(kEnough);
+  FakeConsole console({"", "", "", "", "", "n"});
+  EXPECT_EQ(run(sensor, console), Outcome::kept) << console.said;
+  const std::vector<CapturedPress>& shown = console.drawn.presses;
+  ASSERT_EQ(shown.size(), 4U);
+  const std::vector<CapturedPress> expected{{"press-01", 160, 150, 57, 1.3},
+                                            {"press-02", 130, 170, 35, 0.5},
+                                            {"press-03", 180, 150, 44, 0.75},
+                                            {"press-04", 160, 140, 50, 1.0}};
+  for (std::size_t i = 0; i < 4; ++i) {
+    EXPECT_THAT(shown[i].name, testing::EndsWith(expected[i].name));
+    EXPECT_NEAR(shown[i].col, expected[i].col, 1) << i;
+    EXPECT_NEAR(shown[i].row, expected[i].row, 1) << i;
+    EXPECT_NEAR(shown[i].radius_px, expected[i].radius_px, 2) << i;
+    EXPECT_NEAR(shown[i].depth_mm, expected[i].depth_mm, 0.03) << i;
+  }
+  EXPECT_NEAR(console.drawn.covered_mm, 1.37, 0.05) << "the deepest press and two grey levels";
+  EXPECT_EQ(console.drawn.mm_per_px, 0.05);
+}
+
+// Cells of 0.6 mm: about 56 of them are darker by 3 levels, a disc 5.1 mm wide.
+TEST_F(GuidedSession, SaysHowWideAndDarkTheContactIs) {
+  FakeSensor sensor({kContactFree, {.depth_mm = 1.0}});
+  FakeConsole console({"", "~120", "q"});
+  console.person = true;
+  EXPECT_EQ(run(sensor, console), Outcome::unfinished) << console.said;
+  double width_mm = 0;
+  double levels = 0;
+  ASSERT_EQ(std::sscanf(console.drawn.words.c_str(),
+                        "contact %lf mm wide, darkest %lf grey levels; live", &width_mm, &levels),
+            2)
+      << console.drawn.words;
+  EXPECT_NEAR(width_mm, 5.1, 0.3);
+  EXPECT_NEAR(levels, 30, 1);
 }
 
 }  // namespace

@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "clients/calibrate/offline/import_folder.hpp"
 #include "clients/calibrate/offline/offline.hpp"
 #include "daemon/calibration/calibration.hpp"
 #include "hal/base/atomic_file.hpp"
@@ -250,6 +251,76 @@ TEST_F(Import, ABallThatContradictsThePictureIsRefused) {
   expect_refused(AllOf(HasSubstr("the radius is 2.2 mm (--radius-mm)"),
                        HasSubstr("2.3 mm apart (shape_config.yaml:10)")),
                  {"--radius-mm", "2.2"});
+}
+
+class ShapeConfig : public testing::Test {
+ protected:
+  [[nodiscard]] ImportSettings read(const std::string& text) const {
+    const fs::path file = temp_.path() / "shape_config.yaml";
+    base::write_file_atomically(file, text);
+    ImportSettings settings;
+    read_shape_config(file, settings);
+    return settings;
+  }
+  template <typename Matcher>
+  void expect_refused(const std::string& text, const Matcher& sentence) const {
+    EXPECT_THAT([&] { (void)read(text); }, ThrowsMessage<std::runtime_error>(sentence)) << text;
+  }
+
+ private:
+  const calibration::TempFolder temp_;
+};
+
+TEST_F(ShapeConfig, NumbersAreAllowedUpToTheirLimits) {
+  EXPECT_EQ(read("row_points: 2\n").rows.value, 2);
+  EXPECT_EQ(read("row_points: 100\n").rows.value, 100);
+  EXPECT_EQ(read("col_points: 2\n").cols.value, 2);
+  EXPECT_EQ(read("col_points: 100\n").cols.value, 100);
+  EXPECT_EQ(read("grid_distance: 0.1\n").pitch_mm.value, 0.1);
+  EXPECT_EQ(read("grid_distance: 100\n").pitch_mm.value, 100);
+  EXPECT_EQ(read("BallRad: 0.2\n").radius_mm.value, 0.2);
+  EXPECT_EQ(read("BallRad: 99\n").radius_mm.value, 99);
+  EXPECT_EQ(read("fps: 0.1\n").fps.value, 0.1);
+  EXPECT_EQ(read("fps: 1000\n").fps.value, 1000);
+  const ImportSettings sizes = read("resolution: [16, 8192]\n");
+  EXPECT_EQ(sizes.width.value_or(Stated{}).value, 16);
+  EXPECT_EQ(sizes.height.value_or(Stated{}).value, 8192);
+  for (const char* key : {"row_points", "col_points"}) {
+    for (const char* value : {"1", "101", "-7", "7.5", "nan"}) {
+      expect_refused(std::string(key) + ": " + value + "\n",
+                     AllOf(HasSubstr(":1: " + std::string(key) + ": \"" + value + "\""),
+                           HasSubstr("a whole number from 2 to 100")));
+    }
+  }
+  for (const char* value : {"0.09", "100.1", "-2.5"}) {
+    expect_refused("grid_distance: " + std::string(value) + "\n",
+                   HasSubstr("a number from 0.1 to 100"));
+  }
+  for (const char* value : {"0.19", "99.1"}) {
+    expect_refused("BallRad: " + std::string(value) + "\n", HasSubstr("a number from 0.2 to 99"));
+  }
+  for (const char* value : {"0.09", "1001"}) {
+    expect_refused("fps: " + std::string(value) + "\n", HasSubstr("a number from 0.1 to 1000"));
+  }
+  for (const char* value : {"[15, 400]", "[500, 8193]", "[500]", "[500, 400, 3]", "[500, 40.5]"}) {
+    expect_refused("resolution: " + std::string(value) + "\n",
+                   HasSubstr("width and height, whole numbers from 16 to 8192"));
+  }
+}
+
+TEST_F(ShapeConfig, QuotesCommentsAndOtherKeysAreNoPartOfANumber) {
+  const ImportSettings settings = read(
+      "# BallRad: 9\n"
+      "lens: none\n"
+      "camera:\r\n"
+      "  resolution: [ 640 , '480' ]   # width, height\n"
+      "\tBallRad:\t\"3.5\" # mm\r\n");
+  EXPECT_EQ(settings.width.value_or(Stated{}).value, 640);
+  EXPECT_EQ(settings.height.value_or(Stated{}).value, 480);
+  EXPECT_EQ(settings.height.value_or(Stated{}).by, "shape_config.yaml:4");
+  EXPECT_EQ(settings.radius_mm.value, 3.5);
+  EXPECT_EQ(settings.radius_mm.by, "shape_config.yaml:5");
+  EXPECT_EQ(settings.rows.by, "usual");
 }
 
 }  // namespace

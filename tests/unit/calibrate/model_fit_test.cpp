@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 #include <vector>
 
 #include "clients/calibrate/fit/model/model_lut.hpp"
@@ -60,6 +61,31 @@ TEST(ModelFit, FindsTheGelThatMadeAPress) {
   const double thickness_error = std::sqrt(fit.covariance(0, 0));
   EXPECT_GT(thickness_error, 1e-4);
   EXPECT_LT(std::abs(std::log(fit.gel.thickness_mm / 2.2)), 3 * thickness_error);
+}
+
+// Nothing but noise: the thickness stays 2 mm ± 35 %, the widths ± 50 % and the kink ± 30 %.
+TEST(ModelFit, PressesThatShowNothingLeaveThePriors) {
+  std::vector<PressProfile> presses;
+  for (const double radius_mm : {2.8, 2.1}) {
+    const Eigen::VectorXd seen = levels(press_ball(4, radius_mm, 2.2), 0);
+    PressProfile& press = presses.emplace_back();
+    press.ball_radius_mm = 4;
+    press.contact_radius_mm = radius_mm;
+    press.smoothing_mm = kSmoothing;
+    for (Eigen::Index i = 1; i < 300; i += 6) {
+      press.radius_mm.push_back(RadialTransform::kStepMm * static_cast<double>(i));
+      press.loss.push_back(seen[i] / kLight);
+      press.noise.push_back(10);  // times the light
+    }
+  }
+  const ModelFit fit = fit_model(presses);
+  for (const auto& [parameter, deviation] : {std::pair{ModelFit::kThickness, 0.35},
+                                             {ModelFit::kNarrow, 0.5},
+                                             {ModelFit::kWide, 0.5},
+                                             {ModelFit::kBulge, 0.3}}) {
+    EXPECT_NEAR(std::sqrt(fit.covariance(parameter, parameter)), deviation, 0.02 * deviation);
+  }
+  EXPECT_NEAR(fit.covariance(ModelFit::kThickness, ModelFit::kWide), 0, 0.002);
 }
 
 /// A map of a press that is darker on one side and across, about (120, 118).
@@ -118,6 +144,22 @@ TEST(ModelLutTest, ReadsABallThroughEveryFilter) {
       area += r;
     }
     EXPECT_LT(sum / area, allowed[static_cast<std::size_t>(steps)]) << steps;
+  }
+}
+
+// Also on gels that scatter much and whose bulge brightens so steeply that its light reaches far
+// into the contact.
+TEST(ModelLutTest, NoDarkeningIsNoIndentation) {
+  GelModel bright = gel();
+  for (const double weight : {0.1, 0.25, 0.5}) {
+    for (const double bulge : {2.0, 5.0, 9.0}) {
+      bright.scattering = {0.28, 1.3, weight};
+      bright.response.bulge_factor = bulge;
+      for (const recon::DepthLut& lut : luts_of(bright, {kLight, kSmoothing, 0.04}, 1.2)) {
+        EXPECT_EQ(lut_mm(lut, 0), 0) << weight << ", " << bulge;
+        EXPECT_NO_THROW(recon::check(lut, true));
+      }
+    }
   }
 }
 

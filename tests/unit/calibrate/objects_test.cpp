@@ -10,6 +10,7 @@
 #include <functional>
 #include <sstream>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "clients/calibrate/calibrate.hpp"
@@ -26,6 +27,9 @@
 namespace dtact::objects {
 namespace {
 
+using testing::AllOf;
+using testing::DoubleNear;
+using testing::ElementsAre;
 using testing::HasSubstr;
 
 constexpr int kWidth = 125;  // 500 x 400 at a quarter of 0.0417 mm
@@ -220,6 +224,88 @@ TEST(Teaching, KeepsThePressesWhileTheDaemonRestarts) {
   Silent console;
   teach({.folder = temp.path(), .name = "lid", .presses = 3}, daemon.options, console);
   EXPECT_EQ(perceive::read_presses(temp.path(), "lid").size(), 3U);
+}
+
+/// Types a line after the first message that contains `after`; none where that is empty.
+class Typing : public Silent {
+ public:
+  Typing(std::string after, std::string line) : after_(std::move(after)), line_(std::move(line)) {}
+
+  [[nodiscard]] ctl::guided::Typed typed() override {
+    if (!due_) return {};
+    due_ = false;
+    return {ctl::guided::Typed::Kind::line, line_};
+  }
+  void say(const std::string& text) override {
+    said += text + "\n";
+    if (after_.empty() || text.find(after_) == std::string::npos) return;
+    due_ = true;
+    after_.clear();
+  }
+
+  std::string said;
+
+ private:
+  std::string after_;
+  std::string line_;
+  bool due_ = false;
+};
+
+/// Teaches the name lid with presses, each a shape and its number of frames at 10 Hz; returns the
+/// depths of those that were stored.
+std::vector<double> taught(const std::vector<std::pair<Shape, int>>& presses, int wanted,
+                           Silent& console) {
+  client::test::PlayedDaemon daemon({[&](client::test::Peer& peer) {
+    peer.greet();
+    v1::Reply status;
+    status.mutable_status()->mutable_calibration()->set_mm_per_px(kMmPerPx / 4);
+    peer.answer(status);
+    peer.done();
+    for (const auto& [shape, frames] : presses) {
+      v1::ServerMessage message;
+      v1::Frame& frame = *message.mutable_frame();
+      frame.mutable_contact()->set_in_contact(true);
+      *frame.mutable_depth() = message_of(map_of(shape, 55, 45));
+      for (int i = 0; i < frames; ++i) peer.send(message);
+      frame.mutable_contact()->set_in_contact(false);
+      peer.send(message);
+    }
+    peer.request();  // until the end
+  }});
+  const calibration::TempFolder temp;
+  teach({.folder = temp.path(), .name = "lid", .presses = wanted}, daemon.options, console);
+  std::vector<double> depths_mm;
+  for (const perceive::TouchMap& press : perceive::read_presses(temp.path(), "lid")) {
+    depths_mm.push_back(static_cast<double>(std::ranges::max(press.mm)));
+  }
+  return depths_mm;
+}
+
+/// The plate's corner, `depth_mm` deep.
+Shape corner_of(double depth_mm) {
+  return [=](double x, double y) { return corner(x, y) / 0.9 * depth_mm; };
+}
+
+// 0.3 mm are needed, and half a second from the first frame of a depth on: six frames.
+TEST(Teaching, TakesNeitherAShallowNorAShortPress) {
+  Typing console("", "");
+  EXPECT_THAT(taught({{corner_of(0.28), 12},
+                      {corner_of(0.6), 5},
+                      {corner_of(0.7), 6},
+                      {corner_of(0.8), 9},
+                      {corner_of(0.9), 9}},
+                     3, console),
+              ElementsAre(DoubleNear(0.7, 0.01), DoubleNear(0.8, 0.01), DoubleNear(0.9, 0.01)));
+  EXPECT_THAT(console.said, AllOf(HasSubstr("Press deeper: at least 0.3 mm"),
+                                  HasSubstr("press 1 of 3 taken, 0.70 mm deep")));
+}
+
+TEST(Teaching, TakesTheLastPressBack) {
+  Typing console("press 2 of 3 taken", "b");
+  EXPECT_THAT(
+      taught({{corner_of(0.5), 9}, {corner_of(0.6), 9}, {corner_of(0.7), 9}, {corner_of(0.8), 9}},
+             3, console),
+      ElementsAre(DoubleNear(0.5, 0.01), DoubleNear(0.7, 0.01), DoubleNear(0.8, 0.01)));
 }
 
 TEST(TaughtObjects, ADamagedFileIsListedAndForgotten) {

@@ -44,7 +44,9 @@ struct Recorded {
   double light = 1 + kFollowed;  ///< Of the frames; the reference has 1.
   bool status = true;
   bool reference = true;
-  std::uint64_t starting = 0;  ///< First frames, after which the reference is taken.
+  std::uint64_t starting = 0;              ///< First frames, after which the reference is taken.
+  v1::Health early = v1::HEALTH_STARTING;  ///< Health flag of these.
+  int decode_scale = 1;                    ///< By what the daemon decoded its JPEGs smaller.
 };
 
 class Reprocess : public testing::Test {
@@ -70,7 +72,7 @@ class Reprocess : public testing::Test {
       frame.set_monotonic_ns(static_cast<std::int64_t>(i + 1) * 16'666'667);
       frame.set_wall_ns(frame.monotonic_ns());
       frame.mutable_jpeg()->set_data(jpeg.data(), jpeg.size());
-      if (i < recorded.starting) frame.add_health(v1::HEALTH_STARTING);
+      if (i < recorded.starting) frame.add_health(recorded.early);
       writer.add(frame);
       if (i == 0) {
         if (recorded.status) writer.add(status());
@@ -82,8 +84,7 @@ class Reprocess : public testing::Test {
       if (i == recorded.starting && i > 0) writer.add(reference_event(frame));
       if (!recorded.reference) continue;
       writer.attach(recording::kCurrentReferencePng, "",
-                    image::encode_png(image::Grey16{fakes::kToyWidth, fakes::kToyHeight,
-                                                    fakes::toy_reference_q8()}));
+                    image::encode_png(reference(recorded.decode_scale)));
     }
     writer.finish();
   }
@@ -140,6 +141,22 @@ class Reprocess : public testing::Test {
   std::string said_;
 
  private:
+  /// The toy's reference in frames that are smaller by `scale`.
+  static image::Grey16 reference(int scale) {
+    const std::vector<std::uint16_t> fine = fakes::toy_reference_q8();
+    image::Grey16 image{fakes::kToyWidth / scale, fakes::kToyHeight / scale, {}};
+    for (int y = 0; y < image.height; ++y) {
+      for (int x = 0; x < image.width; ++x) {
+        int sum = 0;
+        for (int i = 0; i < scale * scale; ++i) {
+          sum += fine[static_cast<std::size_t>((scale * y + i / scale) * fakes::kToyWidth +
+                                               scale * x + i % scale)];
+        }
+        image.pixels.push_back(static_cast<std::uint16_t>(sum / (scale * scale)));
+      }
+    }
+    return image;
+  }
   static v1::Status status() {
     v1::Status status;
     status.set_light_followed(kFollowed);
@@ -185,6 +202,27 @@ TEST_F(Reprocess, ARecordingWithoutAStatusHasTheLightOfItsReference) {
   EXPECT_THAT(made.off_um, SizeIs(kFrames));
   EXPECT_THAT(made.off_um, Each(testing::Lt(10)));
   EXPECT_THAT(made.statuses, SizeIs(0));
+}
+
+// What the daemon did not measure is not measured, either.
+TEST_F(Reprocess, MakesNoDepthWhileTheReferenceDoesNotHold) {
+  for (const v1::Health flag : {v1::HEALTH_LIGHT_UNSETTLED, v1::HEALTH_REFERENCE_STALE}) {
+    record("a.mcap", {.light = 1, .starting = 10, .early = flag});
+    ASSERT_EQ(run("a.mcap", "b.mcap", {"--force"}), 0) << said_;
+    EXPECT_THAT(read("b.mcap").off_um, SizeIs(kFrames - 10)) << v1::Health_Name(flag);
+    EXPECT_THAT(said_, HasSubstr("120 frames, depth made anew in 110"));
+  }
+}
+
+// The calibration is of whole frames, and the recording holds the JPEGs as the camera gave them.
+TEST_F(Reprocess, DecodesAsSmallAsTheDaemonDid) {
+  for (const int scale : {2, 4}) {
+    record("a.mcap", {.decode_scale = scale});
+    ASSERT_EQ(run("a.mcap", "b.mcap", {"--force"}), 0) << scale << ": " << said_;
+    const Read made = read("b.mcap");
+    EXPECT_THAT(made.off_um, SizeIs(kFrames)) << scale;
+    EXPECT_THAT(made.off_um, Each(testing::Lt(10))) << scale;
+  }
 }
 
 // The part is a pipe, which the program waits to open until the signal has come.

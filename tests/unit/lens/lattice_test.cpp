@@ -90,5 +90,16 @@ TEST(Candidates, AreTheBlobsOfTheirSize) {
   EXPECT_TRUE(near({100, 70}));
 }
 
+// Also where the size is a single pixel: next to a maximum there is no other.
+TEST(Candidates, APointIsOneOfAnySize) {
+  for (const double sigma : {1.0, 1.9, 2.4, 5.0}) {
+    cv::Mat1f image(70, 110, 0.F);
+    image(31, 47) = 100;
+    const auto candidates = find_candidates(image, sigma);
+    ASSERT_EQ(candidates.size(), 1U) << sigma;
+    EXPECT_EQ(candidates[0].px, cv::Point2d(47, 31)) << sigma;
+  }
+}
+
 }  // namespace
 }  // namespace dtact::ctl

@@ -205,8 +205,7 @@ TEST(Pins, HasNoLatticeWhereMostPinsOfASmallBoardAreMissing) {
   Scene scene;
   scene.board = {3, 4, 3.5};
   scene.missing = {{1, 1}, {1, 2}, {1, 3}, {2, 1}, {2, 2}, {2, 3}};
-  EXPECT_THAT([&] { (void)scene.find(); },
-              ThrowsMessage<std::runtime_error>(HasSubstr("board: ")));
+  EXPECT_THAT([&] { (void)scene.find(); }, ThrowsMessage<std::runtime_error>(HasSubstr("board: ")));
 }
 
 // A lens takes twelve marks. Before: "too few points".
