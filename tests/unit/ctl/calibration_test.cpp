@@ -7,8 +7,10 @@
 #include <filesystem>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "clients/cpp/client.hpp"
+#include "clients/ctl/calibration_text.hpp"
 #include "hal/base/atomic_file.hpp"
 #include "tests/unit/ctl/run_ctl.hpp"
 #include "tests/unit/net/rig.hpp"
@@ -116,6 +118,45 @@ TEST(Calibration, IsListed) {
   EXPECT_THAT(json, HasSubstr(R"("name":"broken","uploaded":"2026-01-31T12:00:00Z",)"
                               R"("current":false,"damage":"calibration.toml:3: scale missing",)"));
   EXPECT_EQ(std::count(json.begin(), json.end(), '\n'), 4);
+}
+
+TEST(Calibration, IsDescribedInALine) {
+  v1::CalibrationSummary summary;
+  summary.set_name("ball");
+  summary.set_method("model");
+  summary.set_width(500);
+  summary.set_height(400);
+  summary.set_frame_width(1280);
+  summary.set_frame_height(720);
+  summary.set_mm_per_px(0.0417);
+  summary.set_covered_from_mm(-0.02);
+  summary.set_covered_to_mm(1.4);
+  summary.set_created("2026-01-31");
+  EXPECT_EQ(text_of(summary),
+            "ball, method model, 500x400 of 1280x720 at 0.0417 mm/px, covers -0.02 to 1.40 mm, "
+            "2026-01-31");
+  summary.add_sharpen_steps(1);
+  summary.add_sharpen_steps(2);
+  EXPECT_THAT(text_of(summary), HasSubstr("1.40 mm, sharpens by 1 or 2, 2026-01-31"));
+  std::vector<v1::StoredCalibration> all(2);
+  all[0].set_number(1234567890123);
+  all[0].set_name("a longer name");
+  all[0].set_pinned(true);
+  all[0].set_current(true);
+  *all[0].mutable_summary() = summary;
+  all[1].set_number(7);
+  all[1].set_uploaded("2026-01-31T12:00:00Z");
+  all[1].set_name("b");
+  all[1].set_in_use(true);
+  all[1].set_current(true);
+  *all[1].mutable_summary() = summary;
+  EXPECT_EQ(text_of(all),
+            "             id  uploaded              name               image        map    mm/px  "
+            "method     range\n"
+            "> 1234567890123  -                     a longer name   1280x720    500x400   0.0417  "
+            "model      -0.02 to 1.40 mm, pinned\n"
+            "*             7  2026-01-31T12:00:00Z  b               1280x720    500x400   0.0417  "
+            "model      -0.02 to 1.40 mm\n");
 }
 
 TEST(Calibration, InUseAndToStartWithAreDistinguished) {

@@ -5,6 +5,8 @@
 
 #include <cmath>
 #include <functional>
+#include <string>
+#include <utility>
 
 #include "clients/common/exit_codes.hpp"
 #include "clients/ctl/screen.hpp"
@@ -126,6 +128,60 @@ TEST(Picture, MarksTheContact) {
   const auto lines = picture_of(f, 0.5, {40, 22, Palette::rgb});
   EXPECT_EQ(columns_of(lines[12].substr(0, lines[12].find('+'))), 10U);
   EXPECT_THAT(lines[11], Not(HasSubstr("+")));
+}
+
+/// Where the cross is: characters before it, and its line.
+std::pair<std::size_t, std::size_t> cross_of(int width, int height, double x_mm, double y_mm) {
+  v1::Frame f = frame(width, height, [](int, int) { return 0.0; });
+  f.mutable_contact()->set_in_contact(true);
+  f.mutable_contact()->set_x_mm(x_mm);
+  f.mutable_contact()->set_y_mm(y_mm);
+  const auto lines = picture_of(f, 0.5, {50, 22, Palette::rgb});
+  for (std::size_t line = 0; line < lines.size(); ++line) {
+    const std::size_t cross = lines[line].find('+');
+    if (cross != std::string::npos) return {columns_of(lines[line].substr(0, cross)), line};
+  }
+  return {0, 0};
+}
+
+// A character is a column and two rows of pixels. Before the middle, too, a place within a pixel is
+// of that pixel.
+TEST(Picture, MarksTheContactInItsOwnCharacter) {
+  // 50 × 40 pixels of 0.1 mm: 12.3 columns and 4.5 rows before the middle are column 12, row 15.
+  EXPECT_EQ(cross_of(50, 40, -1.23, -0.45), std::pair(12UL, 7UL));
+  // 50 × 40 pixels of 0.2 mm: 5.5 columns and 1.5 rows behind it are column 30, row 21.
+  EXPECT_EQ(cross_of(100, 80, 1.1, 0.3), std::pair(30UL, 10UL));
+}
+
+TEST(Picture, IsNeitherTurnedNorMirrored) {
+  const v1::Frame corner =
+      frame(50, 40, [](int x, int y) { return x >= 30 && y >= 12 ? 0.5 : 0.0; });
+  const auto lines = picture_of(corner, 0.5, {50, 22, Palette::rgb});
+  const Colour high = cli::colour_of(1);
+  const std::string lit = "\x1b[38;2;" + std::to_string(high.r) + ";";
+  EXPECT_EQ(columns_of(lines[6]), 50U);
+  EXPECT_THAT(lines[5], Not(HasSubstr(lit))) << "rows 10 and 11";
+  EXPECT_EQ(columns_of(lines[6].substr(0, lines[6].find(lit))), 30U) << "rows 12 and 13";
+  EXPECT_THAT(lines[19], HasSubstr(lit)) << "the last rows";
+}
+
+std::string refusal_of(const char* term) {
+  try {
+    (void)palette_of(term, "truecolor");
+  } catch (const cli::Failure& e) {
+    return e.what();
+  }
+  return "none";
+}
+
+TEST(Picture, NamesTheTerminalThatHasNoColours) {
+  for (const char* term : {"dumb", "vt100", "xterm-mono"}) {
+    EXPECT_EQ(refusal_of(term),
+              std::string("--draw needs a terminal with colours, and TERM is \"") + term +
+                  "\": leave it out");
+  }
+  EXPECT_THAT(refusal_of(nullptr), HasSubstr("TERM is \"\""));
+  EXPECT_EQ(refusal_of("vt220"), "none");
 }
 
 TEST(Picture, UsesTheColoursThatTheTerminalHas) {

@@ -91,6 +91,20 @@ TEST(Align, ABallOnTheSideOfAFingerDoesNotShowItsRotation) {
   }
 }
 
+// From 0.3 mm on a surfel has no weight. The mean over no distances is not a number, and is not
+// reported.
+TEST(Align, WhatIsTooFarAwayCountsForNothing) {
+  const Frame deep([](const SurfacePoint&) { return 1.0; });
+  const Frame light([](const SurfacePoint&) { return 0.4; });
+  const Alignment found = align(deep.view().surfels(1500), light.view(), Motion::Identity());
+  EXPECT_GT(found.arm, 1e-3) << "surfels were compared";
+  EXPECT_EQ(found.points, 0U);
+  EXPECT_EQ(found.overlap, 0);
+  EXPECT_EQ(found.fit, 0);
+  EXPECT_EQ(found.rms, 0);
+  EXPECT_TRUE(found.motion.isApprox(Motion::Identity()));
+}
+
 TEST(Align, APlateDoesNotShowItsSlidingNorItsTurning) {
   // A ball of ten metres: flat over the map.
   const Balls plate{{{{0, 0, 9999.5}, 10000}}};

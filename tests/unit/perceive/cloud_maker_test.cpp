@@ -7,6 +7,8 @@
 #include <cstdint>
 #include <limits>
 #include <random>
+#include <span>
+#include <utility>
 #include <vector>
 
 #include "clients/geometry/point_cloud.hpp"
@@ -178,6 +180,59 @@ TEST(Rows, LargestIsTheFarthestFromZero) {
   EXPECT_EQ(largest(std::vector<float>{1, -7.25F, nan, 3, -nan}.data(), 5), 7.25F);
   EXPECT_EQ(largest(&nan, 1), 0);
   EXPECT_EQ(count_holes(std::vector<float>{1, nan, 2, nan, -nan}.data(), 5), 3);
+}
+
+// Maps of one scale that differ in one side only.
+TEST(CloudMaker, ATableIsOfOneWidthAndOneHeight) {
+  CloudMaker maker(surfaces()[2]);
+  const std::vector<std::int16_t> values(std::size_t{50} * 30, 100);
+  const auto table_of = [&](int width, int height) {
+    const auto size = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
+    const DepthGrid grid{.width = width,
+                         .height = height,
+                         .full_width = width,
+                         .full_height = height,
+                         .mm_per_px = 0.0417,
+                         .values = std::span(values).first(size)};
+    PointCloud cloud;
+    maker.make(grid, 1, cloud);
+    EXPECT_EQ(maker.table()->width, width);
+    EXPECT_EQ(maker.table()->height, height);
+    return cloud.drawn.tables;
+  };
+  const std::uint64_t first = table_of(40, 30);
+  const std::uint64_t wide = table_of(50, 30);
+  const std::uint64_t low = table_of(40, 20);
+  EXPECT_EQ(table_of(40, 30), first);
+  EXPECT_EQ(table_of(50, 30), wide);
+  EXPECT_EQ(table_of(40, 20), low);
+}
+
+// A row has at most 64 tiles: those of 2049 columns are twice as wide.
+TEST(CloudMaker, MakesTheLastOf64TilesAnew) {
+  for (const int width : {2048, 2049}) {
+    std::vector<std::int16_t> map(3 * static_cast<std::size_t>(width));
+    const DepthGrid grid{.width = width,
+                         .height = 3,
+                         .full_width = width,
+                         .full_height = 3,
+                         .mm_per_px = 0.05,
+                         .values = map};
+    const std::size_t left = static_cast<std::size_t>(width) + 5;
+    const std::size_t right = 2 * static_cast<std::size_t>(width) - 4;
+    CloudMaker maker;
+    PointCloud cloud;
+    for (const auto& [left_um, right_um] : {std::pair{300, 500}, {0, 700}, {400, 0}, {0, 0}}) {
+      map[left] = static_cast<std::int16_t>(left_um);
+      map[right] = static_cast<std::int16_t>(right_um);
+      maker.make(grid, 1, cloud);
+      EXPECT_NEAR(cloud.part(PointCloud::kZ)[left], -1e-6 * left_um, 1e-9) << width;
+      EXPECT_NEAR(cloud.part(PointCloud::kZ)[right], -1e-6 * right_um, 1e-9) << width;
+      PointCloud anew;
+      CloudMaker().make(grid, 1, anew);
+      expect_same(cloud, anew, "the whole row");
+    }
+  }
 }
 
 }  // namespace

@@ -137,5 +137,23 @@ TEST(MeshFile, BrokenFilesAreReportedByPlaceAndFix) {
   EXPECT_THAT(error_of(std::string(kMaxMeshBytes + 1, ' ')), HasSubstr("larger than 64 MiB"));
 }
 
+TEST(MeshFile, PointsOfTextHaveANormalOfThreeFiniteNumbers) {
+  const auto with_normal = [](const std::string& properties, const std::string& values) {
+    return "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\n"
+           "property float z\n" +
+           properties + "end_header\n+1.5 -2 3 " + values + "\n";
+  };
+  const std::string two = "property float nx\nproperty float ny\n";
+  const std::string three = two + "property float nz\n";
+  const Mesh mesh = parse_mesh(with_normal(three, "0 +0.6 0.8"), "object");
+  ASSERT_EQ(mesh.points.size(), 1U);
+  ASSERT_EQ(mesh.normals.size(), 1U);
+  EXPECT_THAT(mesh.points[0], testing::ElementsAre(1.5, -2, 3));
+  EXPECT_THAT(mesh.normals[0], testing::ElementsAre(0, 0.6, 0.8));
+  EXPECT_THAT(error_of(with_normal(three, "0 nan 1")),
+              HasSubstr("a normal is not a finite number"));
+  EXPECT_THAT(error_of(with_normal(two, "0 1")), HasSubstr("neither faces nor normals"));
+}
+
 }  // namespace
 }  // namespace dtact::perceive

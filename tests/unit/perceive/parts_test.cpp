@@ -2,9 +2,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <cstring>
 #include <functional>
+#include <tuple>
+#include <vector>
 
 #include "clients/cpp/errors.hpp"
 #include "clients/perceive/cloud_message.hpp"
@@ -123,6 +126,48 @@ TEST(DepthCrop, ALightPressHasAContactAsWell) {
   EXPECT_FALSE(part.contact(contact_of(0.2)).has_value());
 }
 
+// A map of 6 × 4 pixels at the calibration's resolution; a daemon of before `decimation` leaves it
+// out.
+TEST(DepthCrop, AMapOfTheCalibrationsResolutionIsCutByItsPixels) {
+  for (const std::uint32_t decimation : {0U, 1U}) {
+    std::vector<std::int16_t> values;
+    for (std::int16_t i = 0; i < 24; ++i) values.push_back(i);
+    v1::DepthMap map = map_of(values);
+    map.clear_x();
+    map.clear_y();
+    map.set_width(6);
+    map.set_height(4);
+    map.set_decimation(decimation);
+    DepthCrop part(map);
+    EXPECT_EQ(part.decimation(), 1);
+    const auto cut = part.cut({3, 1, 2, 3});
+    ASSERT_TRUE(cut.has_value());
+    EXPECT_EQ(cut->x, 3);
+    EXPECT_EQ(cut->y, 1);
+    EXPECT_EQ(cut->width, 2);
+    EXPECT_EQ(cut->height, 3);
+    EXPECT_THAT(cut->values, ElementsAre(9, 10, 15, 16, 21, 22));
+  }
+}
+
+// 16 pixels of the calibration's resolution: eight of this map, whose 40 × 30 are part of another.
+TEST(DepthCrop, TheMarginIsInPixelsOfTheCalibration) {
+  std::vector<std::int16_t> values(1200, 0);
+  values[11 * 40 + 20] = 800;
+  values[14 * 40 + 22] = 700;
+  v1::DepthMap map = map_of(values);
+  map.set_width(40);
+  map.set_height(30);
+  DepthCrop part(map);
+  const auto contact = part.contact(contact_of(0.8, 0.3));
+  ASSERT_TRUE(contact.has_value());
+  // Columns 20 to 22 and rows 11 to 14 of the part, which begins at (10, 20).
+  EXPECT_EQ(contact->x, 10 + 20 - 8);
+  EXPECT_EQ(contact->y, 20 + 11 - 8);
+  EXPECT_EQ(contact->width, 3 + 16);
+  EXPECT_EQ(contact->height, 4 + 16);
+}
+
 TEST(DepthCrop, RefusesADamagedMap) {
   EXPECT_THROW(DepthCrop(map_of({1, 2, 3})), client::ProtocolError);
 }
@@ -176,6 +221,63 @@ TEST(PoseMessage, MillimetresAndDegrees) {
   EXPECT_DOUBLE_EQ(message.arm_mm(), 2);
   ASSERT_EQ(message.unobservable_size(), 1);
   EXPECT_EQ(message.unobservable(0).translation().y(), 1);
+}
+
+// Each number of its own, so that none stands for another.
+TEST(PoseMessage, HasEachNumberInItsPlace) {
+  Tracker::Pose pose;
+  pose.state = Tracker::State::recovered;
+  pose.since = 41;
+  pose.alternatives = 5;
+  pose.alignment.motion.translation() = Eigen::Vector3d(0.0015, -0.00225, 0.00075);
+  pose.alignment.motion.linear() =
+      Eigen::AngleAxisd(2 * M_PI / 3, Eigen::Vector3d(1, -2, 2) / 3).toRotationMatrix();
+  pose.alignment.centre = Eigen::Vector3d(0.001, -0.002, 0.003);
+  pose.alignment.arm = 0.0025;
+  pose.alignment.rms = 12e-6;
+  pose.alignment.points = 700;
+  Twist unobservable;
+  unobservable << 0.1, 0.2, 0.3, 0.4, 0.5, 0.6;
+  pose.unobservable.push_back(unobservable);
+  v1::ObjectPose message;
+  fill(pose, message);
+  EXPECT_EQ(message.tracking(), v1::ObjectPose::RECOVERED);
+  EXPECT_TRUE(message.valid());
+  EXPECT_EQ(message.since_sequence(), 41U);
+  EXPECT_EQ(message.alternatives(), 5U);
+  EXPECT_EQ(message.points(), 700U);
+  EXPECT_NEAR(message.arm_mm(), 2.5, 1e-9);
+  EXPECT_NEAR(message.residual_um(), 12, 1e-9);
+  const auto is = [](const v1::Vector3& vector, double x, double y, double z) {
+    EXPECT_NEAR(vector.x(), x, 1e-6);
+    EXPECT_NEAR(vector.y(), y, 1e-6);
+    EXPECT_NEAR(vector.z(), z, 1e-6);
+  };
+  is(message.translation_mm(), 1.5, -2.25, 0.75);
+  is(message.rotation_deg(), 40, -80, 80);
+  is(message.centre_mm(), 1, -2, 3);
+  ASSERT_EQ(message.unobservable_size(), 1);
+  is(message.unobservable(0).rotation(), 0.1, 0.2, 0.3);
+  is(message.unobservable(0).translation(), 0.4, 0.5, 0.6);
+}
+
+TEST(PoseMessage, SaysWhichStatesHaveAMotion) {
+  using State = Tracker::State;
+  for (const auto& [state, tracking, valid] :
+       {std::tuple(State::started, v1::ObjectPose::STARTED, true),
+        {State::tracked, v1::ObjectPose::TRACKED, true},
+        {State::recovered, v1::ObjectPose::RECOVERED, true},
+        {State::lost, v1::ObjectPose::LOST, false},
+        {State::searching, v1::ObjectPose::SEARCHING, false},
+        {State::idle, v1::ObjectPose::UNSPECIFIED, false}}) {
+    Tracker::Pose pose;
+    pose.state = state;
+    v1::ObjectPose message;
+    fill(pose, message);
+    EXPECT_EQ(message.tracking(), tracking);
+    EXPECT_EQ(message.valid(), valid) << tracking;
+    EXPECT_EQ(message.has_translation_mm(), state != State::searching) << tracking;
+  }
 }
 
 /// The map as a part that covers the whole.

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <limits>
 #include <numbers>
 #include <stdexcept>
 
@@ -263,6 +265,78 @@ TEST(PointCloud, RefusesContradictingSizes) {
   EXPECT_THROW(CloudMaker().make(map.grid, 1, cloud), std::invalid_argument);
   map.grid.full_width = 4;
   EXPECT_THROW(CloudMaker().make(map.grid, 0, cloud), std::invalid_argument);
+}
+
+TEST(PointCloud, RefusesEachSizeThatContradictsAnother) {
+  // Columns 2 … 5 and rows 1 … 3, which are the last of the whole map.
+  const auto refused = [](const std::function<void(DepthGrid&)>& change) {
+    Map map(4, 3, 0.1);
+    map.grid.x = 2;
+    map.grid.y = 1;
+    map.grid.full_width = 6;
+    map.grid.full_height = 4;
+    change(map.grid);
+    PointCloud cloud;
+    try {
+      CloudMaker().make(map.grid, 1, cloud);
+      return false;
+    } catch (const std::invalid_argument&) {
+      return true;
+    }
+  };
+  EXPECT_FALSE(refused([](DepthGrid&) {}));
+  EXPECT_TRUE(refused([](DepthGrid& grid) { grid.x = 3; }));
+  EXPECT_TRUE(refused([](DepthGrid& grid) { grid.x = -1; }));
+  EXPECT_TRUE(refused([](DepthGrid& grid) { grid.y = 2; }));
+  EXPECT_TRUE(refused([](DepthGrid& grid) { grid.y = -1; }));
+  EXPECT_TRUE(refused([](DepthGrid& grid) { grid.full_width = 5; }));
+  EXPECT_TRUE(refused([](DepthGrid& grid) { grid.full_height = 3; }));
+  EXPECT_TRUE(refused([](DepthGrid& grid) { grid.values = grid.values.first(11); }));
+  for (const double scale : {0.0, -0.1, std::numeric_limits<double>::quiet_NaN()}) {
+    EXPECT_TRUE(refused([scale](DepthGrid& grid) { grid.mm_per_px = scale; })) << scale;
+  }
+  EXPECT_TRUE(refused([](DepthGrid& grid) {
+    grid.width = 0;
+    grid.values = {};
+  }));
+  EXPECT_TRUE(refused([](DepthGrid& grid) {
+    grid.height = 0;
+    grid.values = {};
+  }));
+}
+
+// 103 = 25 · 4 + 3 and 54 = 13 · 4 + 2: the blocks of four begin at column 1 and row 1, and the
+// third pixel of a block is taken.
+TEST(PointCloud, AStrideLeavesBothSidesOutAlike) {
+  Map map(103, 54, 0.05);
+  for (int row = 0; row < 54; ++row) {
+    for (int column = 0; column < 103; ++column) {
+      map.at(row, column) = static_cast<std::int16_t>(103 * row + column);
+    }
+  }
+  CloudMaker maker;
+  PointCloud cloud;
+  const auto expect_pixels = [&](int x, int y, int width, int height) {
+    EXPECT_EQ(cloud.stride, 4);
+    ASSERT_EQ(cloud.x, x);
+    ASSERT_EQ(cloud.y, y);
+    ASSERT_EQ(cloud.width, width);
+    ASSERT_EQ(cloud.height, height);
+    for (int i = 0; i < height; ++i) {
+      for (int k = 0; k < width; ++k) {
+        const auto at = static_cast<std::size_t>(i * width + k);
+        ASSERT_NEAR(cloud.part(PointCloud::kZ)[at], -1e-6 * (103 * (y + 4 * i) + x + 4 * k), 1e-9);
+      }
+    }
+  };
+  maker.make(map.grid, 4, cloud);
+  expect_pixels(3, 3, 25, 13);
+  const Map beside = map.cut(5, 6, 30, 20);  // columns to 34 and rows to 25
+  maker.make(beside.grid, 4, cloud);
+  expect_pixels(7, 7, 7, 5);
+  const Map between = map.cut(4, 4, 3, 3);
+  maker.make(between.grid, 4, cloud);
+  expect_pixels(7, 7, 0, 0);
 }
 
 }  // namespace

@@ -102,6 +102,13 @@ TEST(SurfaceTable, HasTheMapsPixels) {
   EXPECT_GT(table.point[1][6 * 21 + 10], 0.5e-3F);
 }
 
+TEST(SurfaceTable, HasTheMapsWidthHeightAndScale) {
+  const SurfaceTable table = make_surface_table({Kind::sphere, 12, 0, 20, 8, 1.41}, 21, 11, 0.5);
+  EXPECT_EQ(table.width, 21);
+  EXPECT_EQ(table.height, 11);
+  EXPECT_EQ(table.mm_per_px, 0.5);
+}
+
 TEST(ProjectToSurface, IsWhereThePointWasLiftedFrom) {
   for (const recon::Surface& surface :
        {recon::Surface{Kind::sphere, 12, 0, 20, 8, 1.41}, {Kind::cylinder, 9, 30, 15, 6, 1.41}}) {
@@ -134,6 +141,26 @@ TEST(ProjectToSurface, BesideTheTableThereIsNone) {
   // Rays that miss the surface.
   const SurfaceTable wide = make_surface_table({Kind::sphere, 3, 0, 20, 5, 1.41}, 181, 181, 0.1);
   EXPECT_FALSE(project_to_surface(wide, {8e-3, 0, -2e-3}).has_value());
+}
+
+// A table that is wider than high, and one that is higher than wide: each side has its own length.
+TEST(ProjectToSurface, EndsAtEachSideOfTheTable) {
+  const recon::Surface sphere{Kind::sphere, 12, 0, 20, 8, 1.41};
+  const SurfaceTable wide = make_surface_table(sphere, 121, 61, 0.05);  // to 3 and 1.5 mm
+  const SurfaceTable tall = make_surface_table(sphere, 61, 121, 0.05);
+  const auto shown = [&](const SurfaceTable& table, double x_mm, double y_mm) {
+    return project_to_surface(table, cast_ray(sphere, x_mm, y_mm).value().point).has_value();
+  };
+  for (const double side : {-1.0, 1.0}) {
+    EXPECT_TRUE(shown(wide, 2.9 * side, 0)) << side;
+    EXPECT_FALSE(shown(wide, 3.1 * side, 0)) << side;
+    EXPECT_TRUE(shown(wide, 0, 1.4 * side)) << side;
+    EXPECT_FALSE(shown(wide, 0, 1.6 * side)) << side;
+    EXPECT_TRUE(shown(tall, 1.4 * side, 0)) << side;
+    EXPECT_FALSE(shown(tall, 1.6 * side, 0)) << side;
+    EXPECT_TRUE(shown(tall, 0, 2.9 * side)) << side;
+    EXPECT_FALSE(shown(tall, 0, 3.1 * side)) << side;
+  }
 }
 
 }  // namespace

@@ -84,6 +84,28 @@ TEST(Child, TakesNoMoreThanItIsBoundTo) {
   });
 }
 
+// Behind what is on its way: 64 KiB, the newlines of earlier lines among them.
+TEST(Child, LinesThatWaitMayHave64KiB) {
+  (void)run("exec sleep 60", "", [](Child& child) {
+    EXPECT_TRUE(child.type("on its way"));
+    EXPECT_FALSE(child.type(std::string(65537, 'x')));
+    EXPECT_TRUE(child.type(std::string(65534, 'x')));
+    EXPECT_FALSE(child.type("xy"));
+    EXPECT_TRUE(child.type("x"));
+    child.end();
+  });
+}
+
+TEST(Child, ALineMayHave8MiBWithItsNewline) {
+  const Received whole = run("head -c 8388607 /dev/zero | tr '\\0' x; echo", "", [](Child&) {});
+  EXPECT_THAT(whole.lines, ElementsAre(testing::SizeIs(8388607)));
+  EXPECT_EQ(*whole.status, 0);
+  const Received longer =
+      run("head -c 8388608 /dev/zero | tr '\\0' x; echo; exec sleep 60", "", [](Child&) {});
+  EXPECT_THAT(longer.lines, ElementsAre());
+  EXPECT_EQ(WTERMSIG(*longer.status), SIGKILL);
+}
+
 TEST(Child, IsEndedAlsoWhereItWillNot) {
   const Received received = run("exec sleep 60", "", [](Child& child) { child.end(); });
   EXPECT_EQ(WTERMSIG(*received.status), SIGTERM);
@@ -103,6 +125,15 @@ TEST(Child, KeepsTheEndOfALongComplaint) {
   const Received received = run("seq 1 5000 >&2; echo last >&2; exit 1", "", [](Child&) {});
   EXPECT_LE(received.errors.size(), 2000U);
   EXPECT_TRUE(received.errors.ends_with("5000\nlast\n"));
+}
+
+TEST(Child, Keeps2000BytesOfAComplaint) {
+  const std::string whole =
+      run("printf a >&2; head -c 1999 /dev/zero | tr '\\0' x >&2", "", [](Child&) {}).errors;
+  EXPECT_EQ(whole, "a" + std::string(1999, 'x'));
+  const std::string end =
+      run("printf ab >&2; head -c 1999 /dev/zero | tr '\\0' x >&2", "", [](Child&) {}).errors;
+  EXPECT_EQ(end, "b" + std::string(1999, 'x'));
 }
 
 TEST(Child, SaysThatAProgramIsNotThere) {

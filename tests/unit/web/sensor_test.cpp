@@ -2,18 +2,25 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
+#include <boost/asio/buffer.hpp>
+#include <boost/asio/buffers_iterator.hpp>
 #include <boost/asio/executor_work_guard.hpp>
 #include <boost/asio/io_context.hpp>
+#include <boost/asio/post.hpp>
 #include <chrono>
+#include <cstdint>
 #include <future>
 #include <memory>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "clients/web/page.hpp"
 #include "clients/web/server.hpp"
 #include "clients/web/source.hpp"
+#include "clients/web/web_socket.hpp"
 #include "daemon/serve/admission.hpp"
 #include "tests/unit/client/played_daemon.hpp"
 #include "tests/unit/web/no_descriptors.hpp"
@@ -172,6 +179,114 @@ TEST(Source, ARefusedSubscriptionLeavesOneThatIsBeingOpened) {
   run_until(io, [&] { return frames > 0; });
   EXPECT_TRUE(answer.has_done());
   EXPECT_EQ(frames, 1U);
+  source->stop();
+}
+
+/// The WebSocket of a viewer: what it sends, and the messages that it receives.
+class ViewerSocket final : public WebSocket {
+ public:
+  explicit ViewerSocket(boost::asio::io_context& io) : io_(io) {}
+
+  void read_some(boost::asio::mutable_buffer into, OnRead done) override {
+    into_ = into;
+    read_ = std::move(done);
+    deliver();
+  }
+  void write(const Parts& parts, bool text, Done done) override {
+    const std::string bytes(boost::asio::buffers_begin(parts), boost::asio::buffers_end(parts));
+    v1::ServerMessage message;
+    // Behind the length.
+    if (!text && message.ParseFromString(bytes.substr(4))) received.push_back(message);
+    boost::asio::post(io_, [done = std::move(done), size = bytes.size()] { done({}, size); });
+  }
+  void end(std::shared_ptr<void> /*held*/) override {}
+  void close() override { read_ = nullptr; }
+  boost::asio::any_io_executor executor() override { return io_.get_executor(); }
+
+  void send(v1::ClientMessage message) {
+    message.set_id(++sent_);
+    const auto length = wire::encode_length(message.ByteSizeLong());
+    unread_.append(reinterpret_cast<const char*>(length.data()), length.size());
+    message.AppendToString(&unread_);
+    deliver();
+  }
+  [[nodiscard]] std::size_t count(bool (v1::ServerMessage::*has)() const) const {
+    return static_cast<std::size_t>(
+        std::ranges::count_if(received, [has](const auto& one) { return (one.*has)(); }));
+  }
+
+  std::vector<v1::ServerMessage> received;
+
+ private:
+  void deliver() {
+    if (!read_ || unread_.empty()) return;
+    const std::size_t size = boost::asio::buffer_copy(into_, boost::asio::buffer(unread_));
+    unread_.erase(0, size);
+    boost::asio::post(io_, [done = std::exchange(read_, nullptr), size] {
+      done({}, {.bytes = size, .text = false, .end = true});
+    });
+  }
+
+  boost::asio::io_context& io_;
+  boost::asio::mutable_buffer into_;
+  OnRead read_;
+  std::string unread_;
+  std::uint64_t sent_ = 0;
+};
+
+// A viewer that is refused a subscription keeps the one that it has.
+TEST(Sensor, ARefusedSubscriptionLeavesTheViewersOwn) {
+  base::UniqueFd listening = client::test::listen_on();
+  const int fd = listening.get();
+  std::promise<void> seen;
+  PlayedDaemon daemon({[&](Peer& peer) {
+                        peer.greet();
+                        Peer feed(fd, nullptr);
+                        feed.greet();
+                        feed.done();
+                        feed.frame(41);
+                        Peer refused(fd, nullptr);
+                        refused.greet();
+                        refused.refuse(v1::ERROR_INVALID, "subscribe.decimation: 3");
+                        seen.get_future().wait();
+                        feed.frame(42);
+                        (void)peer.ends_silently();
+                      }},
+                      std::move(listening));
+  boost::asio::io_context io;
+  net::NetConfig config;
+  config.log = [](const net::LogLine&) {};
+  net::Admission admission(config);
+  const auto source = std::make_shared<Source>(io, "left", daemon.options);
+  const auto sensor = std::make_shared<Sensor>(io, source, config, admission);
+  sensor->start();
+  source->start();
+  run_until(io, [&] { return source->connected(); });
+  const auto viewer = std::make_shared<ViewerSocket>(io);
+  net::Peer peer;
+  peer.address = "192.0.2.7:40312";
+  peer.host = "192.0.2.7";
+  sensor->admit(viewer, peer, nullptr);
+  const auto replies = [&] { return viewer->count(&v1::ServerMessage::has_reply); };
+  const auto frames = [&] { return viewer->count(&v1::ServerMessage::has_frame); };
+  v1::ClientMessage hello;
+  hello.mutable_hello()->set_major(wire::kMajor);
+  viewer->send(hello);
+  run_until(io, [&] { return replies() == 1; });
+  v1::ClientMessage subscribe;
+  subscribe.mutable_subscribe()->set_summary(true);
+  viewer->send(subscribe);
+  run_until(io, [&] { return frames() == 1; });
+  ASSERT_EQ(frames(), 1U);
+  subscribe.mutable_subscribe()->set_decimation(3);
+  viewer->send(subscribe);
+  run_until(io, [&] { return replies() == 3; });
+  EXPECT_EQ(viewer->received.back().reply().error().message(), "subscribe.decimation: 3");
+  seen.set_value();
+  run_until(io, [&] { return frames() == 2; });
+  EXPECT_EQ(frames(), 2U);
+  EXPECT_EQ(viewer->received.back().frame().sequence(), 42U);
+  sensor->stop();
   source->stop();
 }
 
