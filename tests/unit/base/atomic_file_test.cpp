@@ -2,7 +2,11 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 
+#include <csignal>
+#include <filesystem>
+#include <string>
 #include <system_error>
 
 #include "tests/fakes/file_log.hpp"
@@ -50,6 +54,50 @@ TEST_F(AtomicFile, FailureLeavesTheOldFileAndNoOther) {
   EXPECT_THROW(write_file_atomically(file, "x"), std::system_error);
   EXPECT_TRUE(fs::exists(file / "inside"));
   EXPECT_EQ(files(), 1);
+}
+
+/// Files of this process may have this many bytes while it lives.
+class FileSizeLimit {
+ public:
+  explicit FileSizeLimit(rlim_t bytes) {
+    ::getrlimit(RLIMIT_FSIZE, &before_);
+    const rlimit few{bytes, before_.rlim_max};
+    handler_ = std::signal(SIGXFSZ, SIG_IGN);
+    ::setrlimit(RLIMIT_FSIZE, &few);
+  }
+  FileSizeLimit(const FileSizeLimit&) = delete;
+  FileSizeLimit& operator=(const FileSizeLimit&) = delete;
+  ~FileSizeLimit() {
+    ::setrlimit(RLIMIT_FSIZE, &before_);
+    (void)std::signal(SIGXFSZ, handler_);
+  }
+
+ private:
+  rlimit before_{};
+  void (*handler_)(int) = nullptr;
+};
+
+// The kernel takes the first bytes and refuses the rest, as on a full disk.
+TEST_F(AtomicFile, WhatCannotBeWrittenWholeLeavesTheOldFileAndNoOther) {
+  const fs::path file = folder_ / "a";
+  write_file_atomically(file, "mine");
+  {
+    const FileSizeLimit limit(10);
+    EXPECT_THROW(write_file_atomically(file, std::string(11, 'x')), std::system_error);
+    EXPECT_EQ(read_file(file), "mine");
+    EXPECT_EQ(files(), 1);
+    write_file_atomically(file, std::string(10, 'y'));
+  }
+  EXPECT_EQ(read_file(file), std::string(10, 'y'));
+  EXPECT_EQ(files(), 1);
+}
+
+TEST_F(AtomicFile, IsReadableToAllUnlessItIsPrivate) {
+  const auto mode_of = [](const fs::path& file) { return fs::status(file).permissions(); };
+  write_file_atomically(folder_ / "a", "x");
+  EXPECT_EQ(mode_of(folder_ / "a"), fs::perms(0644));
+  write_file_atomically(folder_ / "a", "x", 0600);
+  EXPECT_EQ(mode_of(folder_ / "a"), fs::perms(0600));
 }
 
 TEST_F(AtomicFile, ReadNamesTheMissingFile) {

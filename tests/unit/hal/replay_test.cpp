@@ -389,6 +389,32 @@ TEST_F(ReplayMcap, SaysWhatIsWrong) {
   EXPECT_THAT(failure(), HasSubstr("no frame can be played: 1 message(s) cannot be read"));
 }
 
+// The second frame is judged by the first, like every later one.
+TEST_F(ReplayMcap, LeavesOutASecondFrameAtTheFirstsTime) {
+  record({{7, picture(10)}, {7, picture(20)}, {17, picture(30)}});
+  ReplayCamera& camera = open();
+  EXPECT_DOUBLE_EQ(camera.info().fps, 100);
+  EXPECT_THAT(camera.report().fix,
+              testing::AllOf(testing::HasSubstr("1 message(s) cannot be read"),
+                             testing::HasSubstr("another frame has the same time")));
+  camera.start();
+  for (const auto& [ms, grey] : {std::pair{0, 10}, {10, 30}, {20, 10}}) {
+    ASSERT_EQ(camera.grab(frame, milliseconds(50)), GrabStatus::ok);
+    EXPECT_EQ(frame.info().timestamp_ns, kStart + ms * kMs);
+    EXPECT_EQ(frame.luma().row(49)[99], grey);
+  }
+}
+
+// A year has 3.15e10 ms, a leap year 3.16e10.
+TEST_F(ReplayMcap, LeavesOutASecondFrameMoreThanAYearLater) {
+  record({{0, picture(10)}, {31'700'000'000, picture(20)}});
+  EXPECT_THAT(open().report().fix,
+              testing::AllOf(testing::HasSubstr("1 message(s) cannot be read"),
+                             testing::HasSubstr("more than a year after the first frame's")));
+  record({{0, picture(10)}, {31'500'000'000, picture(20)}});
+  EXPECT_EQ(open().report().fix, "");
+}
+
 TEST_F(ReplayMcap, PlaysInTheOrderOfTheTimesAndReportsWhatIsLeftOut) {
   using testing::HasSubstr;
   record({{40, picture(30)},

@@ -32,8 +32,9 @@ class LeasingSource final : public Source {
 
   [[nodiscard]] Format format() const noexcept override {
     Format f;
-    f.width = f.height = kSide;
-    f.bytes_per_line = kSide;
+    f.width = width;
+    f.height = height;
+    f.bytes_per_line = width;
     f.full_range = full_range;
     f.zero_copy = true;
     f.encoding = encoding;
@@ -88,6 +89,8 @@ class LeasingSource final : public Source {
   }
 
   static constexpr std::size_t kRoom = 1024;
+  int width = kSide;
+  int height = kSide;
   Encoding encoding = Encoding::grey;
   std::size_t bytes = kPixels;  // of every payload
   bool full_range = true;
@@ -186,6 +189,58 @@ TEST(LiveCamera, DecodesJpegsAtASmallerSize) {
   EXPECT_EQ(frame.luma().height, kSide / 4);
   EXPECT_NEAR(frame.luma().row(3)[3], 90, 1);
   EXPECT_EQ(frame.jpeg().size(), jpeg.size());
+}
+
+// Width and height differ, so that one in place of the other shows.
+TEST(LiveCamera, FramesNeedNotBeSquare) {
+  CameraConfig config = small();
+  config.width = 32;
+  config.height = 16;
+  for (const int scale : {1, 2, 4}) {
+    config.decode_scale = scale;
+    const auto source = std::make_shared<LeasingSource>();
+    source->width = 32;
+    source->height = 16;
+    source->encoding = Encoding::jpeg;
+    LiveCamera camera(config, "test", "nothing yet",
+                      [&]() -> Opened { return {source, "the one", "MJPEG", {}}; });
+    camera.start();
+    EXPECT_EQ(camera.info().width, 32 / scale);
+    EXPECT_EQ(camera.info().height, 16 / scale);
+    EXPECT_EQ(camera.info().fps, 60);
+    // The right half is bright.
+    const std::vector<std::uint8_t> jpeg = fakes::make_jpeg(
+        {.width = 32, .height = 16, .colour = false}, [](int x, int) { return x < 16 ? 40 : 200; });
+    ASSERT_LE(jpeg.size(), LeasingSource::kRoom);
+    source->fill(0, jpeg);
+    Frame frame;
+    ASSERT_EQ(camera.grab(frame, milliseconds(100)), GrabStatus::ok);
+    ASSERT_EQ(frame.luma().width, 32 / scale);
+    ASSERT_EQ(frame.luma().height, 16 / scale);
+    const int bottom = 16 / scale - 1;
+    EXPECT_NEAR(frame.luma().row(bottom)[32 / scale - 1], 200, 3) << scale;
+    EXPECT_NEAR(frame.luma().row(bottom)[0], 40, 3) << scale;
+  }
+  CameraConfig raw = config;
+  raw.decode_scale = 1;
+  const auto source = std::make_shared<LeasingSource>();
+  source->width = 32;
+  source->height = 16;
+  source->bytes = 512;
+  LiveCamera camera(raw, "test", "nothing yet",
+                    [&]() -> Opened { return {source, "the one", "GREY", {}}; });
+  camera.start();
+  source->fill(0, 50);
+  source->memory[0][15 * 32 + 31] = 99;
+  Frame frame;
+  ASSERT_EQ(camera.grab(frame, milliseconds(100)), GrabStatus::ok);
+  EXPECT_EQ(frame.luma().width, 32);
+  EXPECT_EQ(frame.luma().height, 16);
+  EXPECT_EQ(frame.luma().row(15)[31], 99);
+  frame.reset();
+  source->bytes = 511;
+  source->fill(0, 50);
+  EXPECT_EQ(camera.grab(frame, milliseconds(100)), GrabStatus::damaged) << "a byte is missing";
 }
 
 TEST(LiveCamera, LendsFullRangeLumaWithoutACopy) {

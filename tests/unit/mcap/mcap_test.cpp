@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <csignal>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -209,6 +210,45 @@ TEST_F(Mcap, WritesAChunkWhenItIsFull) {
   EXPECT_EQ(writer.open_bytes(), 0U);
   EXPECT_EQ(sink.synced, sink.bytes.size());
   EXPECT_THROW(writer.add(Message{9, 0, 0, 0, ""}), std::invalid_argument);
+  EXPECT_THROW(writer.add(Message{0, 0, 0, 0, ""}), std::invalid_argument);
+  EXPECT_THROW(writer.add(Message{2, 0, 0, 0, ""}), std::invalid_argument);
+}
+
+// A message takes 31 bytes and its data.
+TEST_F(Mcap, AChunkThatIsExactlyFullIsWritten) {
+  MemorySink sink;
+  Writer writer(sink, {.chunk_bytes = 2 * (31 + 100)});
+  const auto channel = writer.add_channel(0, "/t", "json");
+  EXPECT_EQ(writer.written(channel), 0U);
+  writer.add(Message{channel, 1, 10, 9, std::string(99, 'x')});
+  writer.add(Message{channel, 2, 20, 9, std::string(100, 'x')});
+  EXPECT_EQ(writer.open_bytes(), 261U);
+  writer.flush();
+  writer.add(Message{channel, 3, 30, 9, std::string(100, 'x')});
+  writer.add(Message{channel, 4, 40, 9, std::string(100, 'x')});
+  EXPECT_EQ(writer.open_bytes(), 0U);
+  EXPECT_EQ(writer.written(channel), 4U);
+}
+
+TEST_F(Mcap, AnAttachmentIsReadIfItsCrcIsRightOrLeftOut) {
+  MemorySink sink;
+  Writer writer(sink);
+  writer.add(Attachment{7, 5, "a.txt", "text/plain", "hello"});
+  const std::size_t crc = sink.bytes.size() - 4;
+  writer.finish();
+  const auto data_of = [&](const std::string& bytes) {
+    write(bytes);
+    const Reader reader(file());
+    return reader.attachment(reader.attachments().at(0)).data;
+  };
+  EXPECT_EQ(data_of(sink.bytes), "hello");
+  std::string without = sink.bytes;
+  without.replace(crc, 4, 4, '\0');
+  EXPECT_EQ(data_of(without), "hello");
+  std::string changed = sink.bytes;
+  changed[crc - 1] = 'O';
+  EXPECT_THAT([&] { (void)data_of(changed); },
+              ThrowsMessage<Error>(HasSubstr("an attachment's CRC is wrong")));
 }
 
 // The file of a killed writer, cut at every byte: every whole chunk is read.
@@ -550,6 +590,32 @@ TEST_F(Mcap, AFileIsNotReplacedUnasked) {
     sink.sync();
   }
   EXPECT_EQ(base::read_file(file()), "yours");
+}
+
+// The kernel takes the first bytes of "lost" and refuses the rest, as on a full disk: no part of it
+// stays, and what comes later is written behind what came before.
+TEST_F(Mcap, WhatIsNotWrittenWholeIsTakenBack) {
+  FileSink sink(file(), true);
+  sink.append("first");
+  rlimit before{};
+  ::getrlimit(RLIMIT_FSIZE, &before);
+  const rlimit few{7, before.rlim_max};
+  auto* const handler = std::signal(SIGXFSZ, SIG_IGN);
+  ::setrlimit(RLIMIT_FSIZE, &few);
+  EXPECT_THAT([&] { sink.append("lost"); },
+              ThrowsMessage<std::system_error>(HasSubstr("a.mcap: File too large")));
+  ::setrlimit(RLIMIT_FSIZE, &before);
+  (void)std::signal(SIGXFSZ, handler);
+  EXPECT_EQ(base::read_file(file()), "first");
+  sink.append(", then");
+  sink.append(" more");
+  EXPECT_EQ(base::read_file(file()), "first, then more");
+}
+
+TEST_F(Mcap, ErrorsNameTheFileAsItIsCalled) {
+  EXPECT_THAT([&] { const FileSink sink(file().parent_path() / "none" / "a", true, "press.mcap"); },
+              ThrowsMessage<std::system_error>(
+                  AllOf(HasSubstr("press.mcap: No such file"), testing::Not(HasSubstr("none")))));
 }
 
 // /dev/full refuses every byte.

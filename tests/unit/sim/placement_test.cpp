@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "tests/unit/sim/small_scene.hpp"
 
@@ -81,6 +82,26 @@ TEST(Placement, ATiltedBallIsABall) {
       }
     }
   }
+}
+
+// The lowest point is searched for on a coarse grid and then more finely around the best one of it,
+// wherever that is. The origin of a ball of radius R that is tilted by a lies R (1 - cos a) above
+// its lowest point.
+TEST(Placement, TheLowestPointIsFoundExactly) {
+  for (const double radius : {0.4, 2.0, 3.7}) {
+    for (int i = -29; i <= 29; ++i) {
+      const double tilt = 2.03 * i;
+      const double lowest = -radius * (1 - std::cos(tilt * kDegree));
+      EXPECT_NEAR(pose_of({}, ball(radius), key_of(0.3, tilt, 0)).z_mm, -0.3 - lowest, 1e-6)
+          << radius << " " << tilt;
+      EXPECT_NEAR(pose_of({}, ball(radius), key_of(0.3, 0, tilt)).z_mm, -0.3 - lowest, 1e-6)
+          << radius << " " << tilt;
+    }
+  }
+  // On a corner that is no point of the grid: cube of 2.3 mm, rolled about a diagonal.
+  EXPECT_NEAR(pose_of({}, cube(2.3), key_of(0.3, 10, 10)).z_mm,
+              -0.3 + 1.15 * std::numbers::sqrt2 * std::sin(10 * std::numbers::sqrt2 * kDegree),
+              1e-5);
 }
 
 TEST(Placement, ACylinderRollsAboutItsAxis) {

@@ -163,6 +163,96 @@ TEST(Scene, ErrorsNameFileLineKeyAndWhatIsAllowed) {
   EXPECT_THAT(error_of("a = [\n"), HasSubstr("scenes/x.toml:"));
 }
 
+/// A key's range as config/scenes/default.toml states it, with the next values outside.
+struct Range {
+  const char* table;
+  const char* key;
+  const char* below;
+  const char* least;
+  const char* most;
+  const char* above;
+};
+
+TEST(Scene, EveryNumberHasTheRangeThatTheBuiltInSceneStates) {
+  constexpr Range kRanges[] = {{"camera", "barrel", "-0.01", "0", "0.5", "0.51"},
+                               {"camera", "exposure", "0.049", "0.05", "4", "4.1"},
+                               {"camera", "gamma", "0.49", "0.5", "3", "3.1"},
+                               {"camera", "read_noise", "-0.1", "0", "3", "3.1"},
+                               {"camera", "shot_noise", "-0.1", "0", "3", "3.1"},
+                               {"camera", "light_delay_frames", "1", "2", "8", "9"},
+                               {"gel", "thickness_mm", "0.49", "0.5", "4.5", "4.6"},
+                               {"gel", "youngs_modulus_mpa", "0.0009", "0.001", "10", "10.1"},
+                               {"gel", "poisson", "0.39", "0.4", "0.5", "0.51"},
+                               {"gel", "grid_mm", "0.049", "0.05", "0.5", "0.51"},
+                               {"gel", "solve_step_mm", "0.019", "0.02", "5", "5.1"},
+                               {"gel", "taper_x", "-0.021", "-0.02", "0.02", "0.021"},
+                               {"gel", "taper_y", "-0.021", "-0.02", "0.02", "0.021"},
+                               {"gel", "texture", "-0.001", "0", "0.02", "0.021"},
+                               {"gel", "texture_mm", "0.049", "0.05", "5", "5.1"},
+                               {"surface", "camera_mm", "-1", "0", "1000", "1001"},
+                               {"optics", "narrow_weight", "-0.1", "0", "1", "1.1"},
+                               {"optics", "far_mm", "-0.1", "0", "12", "12.1"},
+                               {"optics", "growth", "-0.1", "0", "1", "1.1"},
+                               {"light", "level", "0.9", "1", "255", "256"},
+                               {"light", "fill", "-0.1", "0", "1", "1.1"},
+                               {"light", "vignetting", "-0.1", "0", "0.9", "0.91"}};
+  for (const Range& range : kRanges) {
+    const auto error_at = [&](const char* value) {
+      return error_of(fmt::format("[{}]\n{} = {}\n", range.table, range.key, value));
+    };
+    EXPECT_EQ(error_at(range.least), "no error") << range.key;
+    EXPECT_EQ(error_at(range.most), "no error") << range.key;
+    for (const char* value : {range.below, range.above}) {
+      EXPECT_THAT(error_at(value),
+                  AllOf(HasSubstr(fmt::format("x.toml:2: {}.{}:", range.table, range.key)),
+                        HasSubstr(fmt::format("from {} to {}", range.least, range.most))))
+          << value;
+    }
+  }
+}
+
+// Of two keys the range of the second depends on the first.
+TEST(Scene, RangesThatDependOnOthersReachTheirEnds) {
+  const auto sphere = [](const char* radius, const char* camera) {
+    return error_of(fmt::format("[surface]\nshape = \"sphere\"\nradius_mm = {}\ncamera_mm = {}\n",
+                                radius, camera));
+  };
+  EXPECT_EQ(sphere("5", "1"), "no error");
+  EXPECT_EQ(sphere("5", "5"), "no error");
+  EXPECT_EQ(sphere("500", "500"), "no error");
+  EXPECT_THAT(sphere("4.9", "1"), HasSubstr("from 5 to 500"));
+  EXPECT_THAT(sphere("501", "1"), HasSubstr("from 5 to 500"));
+  EXPECT_THAT(sphere("30", "0.9"), HasSubstr("from 1 to 30"));
+  EXPECT_EQ(error_of("[optics]\nnarrow_weight = 0.75\nfar_weight = 0.25\n"), "no error");
+  EXPECT_EQ(error_of("[optics]\nnarrow_weight = 0\nfar_weight = 1\n"), "no error");
+
+  const auto cube = [](const char* key) {
+    return error_of(
+        fmt::format("[gel]\nthickness_mm = 3.0\n[[press]]\nobject = \"cube\"\n"
+                    "side_mm = 4.0\nkeys = [ {{ t = 0.0, {} }} ]\n",
+                    key));
+  };
+  for (const char* key :
+       {"depth = 2.7", "depth = -10", "tilt_x = -60", "tilt_x = 60", "tilt_y = -60", "tilt_y = 60",
+        "drag_x = -3", "drag_x = 3", "drag_y = -3", "drag_y = 3"}) {
+    EXPECT_EQ(cube(key), "no error") << key;
+  }
+  EXPECT_THAT(cube("depth = 2.71"), HasSubstr("from -10 to 2.7"));
+  for (const char* key : {"tilt_x = -61", "tilt_x = 61", "tilt_y = -61"}) {
+    EXPECT_THAT(cube(key), HasSubstr("from -60 to 60")) << key;
+  }
+  for (const char* key : {"drag_x = -3.1", "drag_x = 3.1", "drag_y = -3.1", "drag_y = 3.1"}) {
+    EXPECT_THAT(cube(key), HasSubstr("from -3 to 3")) << key;
+  }
+  // The response must rise up to the deepest press: 0.9 of the 2 mm, here 1.8 mm.
+  EXPECT_EQ(error_of("[optics]\npressed_slope = 0.37\npressed_curve = -0.1\n"), "no error");
+  EXPECT_THAT(error_of("[optics]\npressed_slope = 0.35\npressed_curve = -0.1\n"),
+              HasSubstr("optics.pressed_curve"));
+  // The loop's end must be later, and without one it may begin anywhere.
+  EXPECT_THAT(error_of("[loop]\nfrom_s = 2.0\nto_s = 2.0\n"), HasSubstr("later than from_s"));
+  EXPECT_EQ(error_of("[loop]\nfrom_s = 2.0\nto_s = 2.1\n"), "no error");
+}
+
 TEST(Scene, UnknownKeysAreErrorsEverywhere) {
   EXPECT_THAT(error_of("colour = 1\n"),
               AllOf(HasSubstr("x.toml:1: colour"), HasSubstr("camera, fault, gel")));

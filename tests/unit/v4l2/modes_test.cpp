@@ -83,6 +83,15 @@ TEST(Modes, RangesOfSizesAndRates) {
   EXPECT_FALSE(range.offers(800, 600, 121));
   EXPECT_FALSE(range.offers(1921, 600, 60));
   EXPECT_FALSE(range.offers(32, 48, 60));
+  // The ends of the three ranges.
+  EXPECT_TRUE(range.offers(1920, 1080, 120));
+  EXPECT_TRUE(range.offers(64, 48, 1));
+  EXPECT_TRUE(range.has_size(64, 1080));
+  EXPECT_FALSE(range.has_size(63, 48));
+  EXPECT_FALSE(range.has_size(64, 47));
+  EXPECT_FALSE(range.has_size(1920, 1081));
+  EXPECT_FALSE(range.has_size(1080, 1920));
+  EXPECT_FALSE(range.offers(800, 600, 0));
   EXPECT_EQ(describe({range}), "GREY 64x48...1920x1080 at 120...1");
   EXPECT_TRUE(mode(V4L2_PIX_FMT_GREY, 8, 8, {}).offers(8, 8, 1000));
 }

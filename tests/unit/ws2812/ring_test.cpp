@@ -148,6 +148,23 @@ TEST(Ws2812Ring, ReSendsTheLightItIsGiven) {
   EXPECT_EQ(record->all().back(), std::vector<Rgb>(8, Rgb{255, 0, 0}));
 }
 
+// resend_ms = 0 is never. An hour is the longest that can be configured.
+TEST(Ws2812Ring, WritesOnceWhatIsNotDueAgain) {
+  for (const int resend_ms : {0, 3'600'000}) {
+    const auto record = std::make_shared<Record>();
+    Ws2812Config config = quiet();
+    config.resend_ms = resend_ms;
+    const auto ours = ring(record, config);
+    (void)ours->show(kRed);
+    for (int i = 0; i < 3; ++i) {
+      EXPECT_EQ(ours->attend(kRed).due, std::chrono::milliseconds(250)) << resend_ms;
+    }
+    EXPECT_EQ(record->all().size(), 1U) << resend_ms;
+    EXPECT_EQ(ours->attend(kRed).writes, 1U) << resend_ms;
+    EXPECT_EQ(record->opened, 1) << "a ring that is there is not looked for";
+  }
+}
+
 TEST(Ws2812Ring, AFailedWriteIsTheCommandsErrorAndHealsByItself) {
   const auto record = std::make_shared<Record>();
   Ws2812Config config = quiet();
@@ -206,6 +223,7 @@ TEST(Ws2812Ring, SetsTheColoursInTheOrderOfTheChain) {
   EXPECT_THAT(order(2, true), ElementsAre(2, 3, 4, 5, 6, 7, 0, 1));
   EXPECT_THAT(order(0, false), ElementsAre(0, 7, 6, 5, 4, 3, 2, 1));
   EXPECT_THAT(order(5, false), ElementsAre(5, 4, 3, 2, 1, 0, 7, 6));
+  EXPECT_THAT(order(7, true), ElementsAre(7, 0, 1, 2, 3, 4, 5, 6));
 }
 
 TEST(Ws2812Ring, AnAbsentRingIsLookedForAndWorksOnceItIsThere) {
@@ -296,6 +314,8 @@ TEST(Ws2812Ring, SettingsThatMakeNoSenseStopTheStart) {
   const auto record = std::make_shared<Record>();
   Ws2812Config config = quiet();
   config.first_led = 8;
+  EXPECT_THROW((void)ring(record, config), std::invalid_argument);
+  config.first_led = -1;
   EXPECT_THROW((void)ring(record, config), std::invalid_argument);
   config = quiet();
   config.current_budget_ma = 0;
