@@ -239,6 +239,10 @@ Graph::Graph(const Config& config) : humble_(config.humble) {
       dds_create_writer(participant_, topic("ros_discovery_info", type), latched.get(), nullptr),
       "no writer of ros_discovery_info");
   readers_ = make_waitset();
+  // A set of nothing is not waited for at all, and without commands there is no reader.
+  checked(dds_waitset_attach(readers_,
+                             checked(dds_create_guardcondition(participant_), "no condition"), 0),
+          "no condition");
 }
 
 Graph::~Graph() { dds_delete(domain_); }

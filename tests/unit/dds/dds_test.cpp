@@ -153,6 +153,13 @@ TEST(Interface, HasAddressesWhileItIsUp) {
 }
 
 // Before: the newest 100, and nobody learned that others were lost.
+// Before: it did not wait, so that a program without commands took a whole core.
+TEST_F(Dds, WaitsForCommandsAlsoWhereNoneAreTaken) {
+  const auto start = std::chrono::steady_clock::now();
+  graph->wait(std::chrono::milliseconds(50));
+  EXPECT_GE(std::chrono::steady_clock::now() - start, std::chrono::milliseconds(49));
+}
+
 TEST_F(Dds, KeepsMessagesWhileTheDiskIsBusy) {
   const std::size_t node = graph->add_node("/left", "dtact");
   const dds_entity_t writer =
