@@ -5,6 +5,7 @@ import net from "node:net";
 const KEPT = 100;
 const HELLO = [8, 1, 0x12, 7, 8, 1, 0x10, 1, 0x1a, 1, 0x78]; // id 1, version 1.1, program "x"
 const SUBSCRIBE = [8, 2, 0x1a, 2, 8, 1]; // id 2, depth: DEPTH_INT16
+const SUBSCRIBE_JPEG = [8, 2, 0x1a, 4, 8, 1, 0x28, 1]; // the same, jpeg: true
 
 /** The fields of a message by number: bigint, Buffer (of 8 or 4 bytes for fixed ones), the last one. */
 export function fields(message) {
@@ -37,10 +38,14 @@ export class Tap {
   #frames = new Map();
   #socket;
 
-  constructor(port) {
+  /**
+   * `jpeg`: it asks for the camera's JPEGs, too. Every frame has one then, also the first of another
+   * client's subscription, which may be older than that.
+   */
+  constructor(port, jpeg = false) {
     let bytes = Buffer.alloc(0);
     this.#socket = net.connect(port, "127.0.0.1");
-    for (const message of [HELLO, SUBSCRIBE]) {
+    for (const message of [HELLO, jpeg ? SUBSCRIBE_JPEG : SUBSCRIBE]) {
       this.#socket.write(Buffer.from([0, 0, 0, message.length, ...message]));
     }
     this.#socket.on("data", (chunk) => {
