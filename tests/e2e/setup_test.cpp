@@ -118,6 +118,27 @@ TEST_F(Setup, FromAnotherCameraToDepth) {
   EXPECT_THAT(output_, HasSubstr("no calibration was made; what was taken is in "));
 }
 
+// Before: one made anew in the folder of an earlier session counted as none.
+TEST_F(Setup, NamesACalibrationThatWasMadeAnewAndNotUploaded) {
+  const fs::path bin = file("bin");
+  fs::remove(bin / "dtactctl");
+  fs::copy_file(DTACTCTL_PROGRAM, bin / "dtactctl");  // what lies beside it is what it runs
+  fs::remove(bin / "dtact-calibrate");
+  std::ofstream(bin / "dtact-calibrate") << "#!/bin/sh\n"
+                                            "while [ \"$1\" != --folder ]; do shift; done\n"
+                                            "mkdir \"$2/calibration/anew\"\n"
+                                            "exit 4\n";
+  fs::permissions(bin / "dtact-calibrate", fs::perms::owner_all);
+  const fs::path made = file("again/calibration");
+  fs::create_directories(made);
+  fs::last_write_time(made, fs::file_time_type::clock::now() - std::chrono::hours(1));
+  EXPECT_EQ(
+      setup({"calibrate", "--folder", "again", "--radius-mm", "4.0", "--mm-per-px", "0.0413793"}),
+      kNotMet);
+  EXPECT_THAT(output_, AllOf(HasSubstr("calibration is made but not in use"),
+                             HasSubstr("calibration upload "), Not(HasSubstr("no calibration"))));
+}
+
 TEST_F(Setup, ReachesADaemonWithoutTcpByItsSocket) {
   std::string text = base::read_file(config());
   replace(text, "[net]", fmt::format("[net]\nunix_socket = \"{}\"", file("sock").string()));
