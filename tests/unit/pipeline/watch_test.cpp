@@ -195,16 +195,22 @@ TEST(RateWatch, BeginsAnewWithACameraOpenedAnew) {
   EXPECT_EQ(watch.rate().fps(), 0);
 }
 
-TEST(SkipWatch, NamesAMachineThatLeavesOutMoreThanAFifth) {
-  SkipWatch watch;
-  hal::FrameInfo info;
-  const auto add = [&](int frames, std::uint64_t step) {
+class SkippedFrames : public testing::Test {
+ protected:
+  /// Every `step`-th frame of the camera arrives.
+  void add(int frames, std::uint64_t step) {
     for (int i = 0; i < frames; ++i) {
       info.sequence += step;
       info.timestamp_ns += static_cast<std::int64_t>(step) * kPeriod;
       watch.add(info);
     }
-  };
+  }
+
+  SkipWatch watch;
+  hal::FrameInfo info;
+};
+
+TEST_F(SkippedFrames, NamesAMachineThatLeavesOutMoreThanAFifth) {
   add(150, 1);
   add(30, 2);  // 30 of 210 in two seconds
   EXPECT_FALSE(watch.behind());
@@ -214,16 +220,7 @@ TEST(SkipWatch, NamesAMachineThatLeavesOutMoreThanAFifth) {
   EXPECT_FALSE(watch.behind());
 }
 
-TEST(SkipWatch, AFifthIsAllowed) {
-  SkipWatch watch;
-  hal::FrameInfo info;
-  const auto add = [&](int frames, std::uint64_t step) {
-    for (int i = 0; i < frames; ++i) {
-      info.sequence += step;
-      info.timestamp_ns += static_cast<std::int64_t>(step) * kPeriod;
-      watch.add(info);
-    }
-  };
+TEST_F(SkippedFrames, AFifthIsAllowed) {
   add(1, 1);
   add(120, 1);
   add(40, 2);  // 40 of 200, in two seconds
